@@ -20,8 +20,10 @@ SHEAR = "simple shear"
 Load = tuple[float | str | None, ...]
 
 
-def calculix(card: str, loads: list[Load], folder) -> list[float]:
+def calculix(card: str, loads: list[Load], folder, orientation: str = "") -> list[float]:
     """Return the engineering stress on axis 1 (or the shear stress) of a cube for each load, from CalculiX.
+
+    The section has an orientation where one is named, which stands behind the card.
 
     A load is the stretches along the three axes, None where an axis is free, or ("simple shear", amount).
     """
@@ -31,7 +33,8 @@ def calculix(card: str, loads: list[Load], folder) -> list[float]:
     deck.append("*ELEMENT, TYPE=C3D8, ELSET=ALL")
     deck += [f"{place + 1}, " + ", ".join(str(8 * place + n + 1) for n in range(8)) for place, _ in enumerate(loads)]
     name = re.search(r"NAME=(\S+)", card)[1]
-    deck += [card.rstrip(), f"*SOLID SECTION, ELSET=ALL, MATERIAL={name}", "*STEP, NLGEOM, INC=1000", "*STATIC"]
+    section = f"*SOLID SECTION, ELSET=ALL, MATERIAL={name}" + (f", ORIENTATION={orientation}" if orientation else "")
+    deck += [card.rstrip(), section, "*STEP, NLGEOM, INC=1000", "*STATIC"]
     deck += ["0.05, 1., 1e-6, 0.1", "*BOUNDARY"]
     for place, load in enumerate(loads):
         deck += [f"{8 * place + n + 1}, {axis}, {axis}, {moved:.12g}" for n, axis, moved in _displacements(load)]

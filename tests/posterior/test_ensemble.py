@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ import tissuq as tq
 from marks import slow_but
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.stress import path_energy
+from tissuq.posterior import ensemble
 from tissuq.posterior.ensemble import drawn_ensemble
 
 STRETCH = np.linspace(0.7, 1.8, 24)
@@ -173,3 +175,48 @@ def test_a_material_that_is_never_stable_says_so():
     with pytest.raises(tq.ModelError, match="draws are stable over the measured range"):
         posterior.ensemble(4)
     assert len(posterior.ensemble(4, admissible=False)) == 4
+
+
+def sheet(material="neo-hookean+standard-fibres@40", **options):
+    """A fit of fibres at a known angle to a simulated sheet."""
+    truth = {"C10": 0.02, "k": 0.05}
+    points = [
+        (1 + a * share, 1 + b * share) for a, b in ((0.3, 0.3), (0.3, 0.1), (0.1, 0.3)) for share in (0.4, 0.7, 1)
+    ]
+    data = tq.simulate("neo-hookean+standard-fibres@40", truth, points, mode="biaxial", noise_sd=2e-4, seed=1)
+    return tq.fit(data, material=material, noise_sd=2e-4, **options)
+
+
+def test_draws_of_fibres_are_their_law_and_give_its_stresses():
+    draws = sheet(discrepancy="none").ensemble(6)
+    assert not draws[0].is_isotropic
+    assert draws.ranges == {"axis 1": (1.0, pytest.approx(1.3)), "axis 2": (1.0, pytest.approx(1.3))}
+    (path, _), point = tq.loading_modes()["biaxial"]().paths, np.array([[1.25, 1.1]])
+    for draw, stress in zip(draws, draws.stress(path, point), strict=True):
+        matrix, stiffness = 2 * draw.values["C10"], draw.values["k"]
+        cosine, sine = np.cos(np.radians(40)) ** 2, np.sin(np.radians(40)) ** 2
+        strain = cosine * (1.25**2 - 1) + sine * (1.1**2 - 1)
+        wanted = matrix * (1.25 - 1 / (1.25**3 * 1.1**2)) + 2 * stiffness * strain * 2 * cosine * 1.25
+        assert stress == pytest.approx([wanted], rel=1e-10)
+        assert tq.engineering_stress(draw, path, point, ()) == pytest.approx([wanted], rel=1e-10)
+
+
+def test_a_matrix_that_is_unstable_is_left_out_with_its_fibres(monkeypatch):
+    posterior = sheet("rivlin:C10,C20+standard-fibres@40", discrepancy="none")
+    usual = ensemble._materials
+
+    def materials(*arguments):
+        first, *others = usual(*arguments)
+        ((material, values),) = first.parts
+        return [replace(first, parts=((material, (-values[0], *values[1:])),)), *others]
+
+    monkeypatch.setattr(ensemble, "_materials", materials)
+    draws = posterior.ensemble(4)
+    assert draws.tried == 6  # two batches, whose first is left out
+    assert all(draw.values["C10"] > 0 for draw in draws)
+    assert {name[-6:] for name in draws.admissible_in} == {"axis 1", "axis 2"}
+
+
+def test_fibres_with_a_free_energy_are_no_materials():
+    with pytest.raises(tq.ModelError, match=r"has fibres.*discrepancy='none'"):
+        sheet(discrepancy="auto").ensemble(2)

@@ -276,12 +276,14 @@ def _simulating(
     model = solution.model
     if not model.discrepancy.is_energy:
         return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' is an error of the stress and no material"
-    if not model.material.is_isotropic:
-        return Verdict.NO, "draws as materials are of isotropic ones only"
+    if not model.material.is_isotropic and model.energy_symbols:
+        return Verdict.NO, "fibres with an energy discrepancy are no material of a finite-element code"
     if (solution.direction_probability or 0.0) > PROBABLE_DIRECTION:
         return Verdict.NO, "the tissue has a preferred direction, and draws as materials have none"
     if "unmodelled-curve" in codes:
         return Verdict.NO, "the fitted curve departs from the measured one"
+    if not model.material.is_isotropic:
+        return Verdict.CARE, "fibres have cards where a code has their law, and need axes in the model"
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)

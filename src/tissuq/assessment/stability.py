@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, States, curve_modes, loading_mode
+from tissuq.experiments.modes import ImposedStretches, LoadingMode, States, curve_modes, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution, are_isotropic
+from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
 from tissuq.mechanics.rays import through
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
@@ -30,6 +31,7 @@ __all__ = [
     "calibrated_range",
     "is_calibrated",
     "stability",
+    "stability_modes",
     "stability_over",
     "stable_draws",
     "stable_ranges",
@@ -201,6 +203,15 @@ def are_stable(model: StatisticalModel, points: GaussianMixture, modes: Sequence
     """
     is_isotropic = are_isotropic(model, points)
     return stable_draws(lambda rows: _curves(model, points[rows]), is_isotropic, model.experiment, modes)
+
+
+def stability_modes(material: Material) -> list[LoadingMode]:
+    """Return the modes in which draws of a material are examined: those of one stretch and one stress.
+
+    With fibres, whose lateral stretches these modes leave open, the stretches are imposed along both axes of the test.
+    """
+    modes = curve_modes()
+    return modes if material.is_isotropic else [ImposedStretches(mode, axis) for axis in (1, 2) for mode in modes]
 
 
 def stable_draws(

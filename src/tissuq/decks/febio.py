@@ -14,6 +14,11 @@ TYPE = re.compile(r"""(\stype\s*=\s*)("[^"]*"|'[^']*')""")
 DENSITY = re.compile(r"<density\b[^>]*>[^<]*</density>")
 SHARED = "rigid body"
 
+KEPT = ("density", "mat_axis")
+"""What stays of a material; its axes where the card has fibres."""
+FIBRES = "Holzapfel-Gasser-Ogden"
+"""The type of cards with fibres."""
+
 
 class FEBioDeck(DeckFormat):
     """``<material id= name= type=>`` below ``<Material>``: its type and what is in it are replaced.
@@ -36,12 +41,14 @@ class FEBioDeck(DeckFormat):
         return _Parsed(content).materials
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
-        head, density = material.remains
+        head, density, axes = material.remains
         kind = TYPE.search(block.partition(">")[0])
         assert kind is not None  # noqa: S101 (the writer's)
         start = TYPE.sub(lambda match: match[1] + kind[2], head, count=1)
         lines = block.partition("\n")[2].rstrip().splitlines()
         lines = [DENSITY.sub(lambda match: density, line) for line in lines]
+        if axes and kind[2].strip("\"'") == FIBRES:
+            lines.insert(-1, axes)
         return "\n".join([start, *(line for line in lines if line.strip())])
 
 
@@ -56,7 +63,7 @@ class _Parsed:
         self._start = 0
         self._attributes: dict[str, str] = {}
         self._words = ""
-        self._density = (0, 0)
+        self._kept = dict.fromkeys(KEPT, (0, 0))
         self._parser = ParserCreate()
         self._parser.StartElementHandler = self._open
         self._parser.EndElementHandler = self._close
@@ -71,9 +78,9 @@ class _Parsed:
             self.includes.append(attributes["from"])
         if name == "material" and self._stack[-1:] == ["Material"]:
             self._start, self._attributes = self._parser.CurrentByteIndex, attributes
-            self._density = (0, 0)
-        if name == "density" and self._stack[-2:] == ["Material", "material"]:
-            self._density = (self._parser.CurrentByteIndex, 0)
+            self._kept = dict.fromkeys(KEPT, (0, 0))
+        if name in KEPT and self._stack[-2:] == ["Material", "material"]:
+            self._kept[name] = (self._parser.CurrentByteIndex, 0)
         self._stack.append(name)
         self._words = ""
 
@@ -84,23 +91,23 @@ class _Parsed:
         self._stack.pop()
         if name == "Include":
             self.includes.append(self._words.strip())
-        if name == "density" and self._stack[-2:] == ["Material", "material"]:
-            self._density = (self._density[0], self._end())
+        if name in KEPT and self._stack[-2:] == ["Material", "material"]:
+            self._kept[name] = (self._kept[name][0], self._end())
         if name == "material" and self._stack[-1:] == ["Material"]:
             end = self._end()
-            text, density = (decoded(self.content[slice(*span)]) for span in ((self._start, end), self._density))
-            self.materials.append(_material(text, density, self._attributes, (self._start, end)))
+            text, *kept = (decoded(self.content[slice(*span)]) for span in ((self._start, end), *self._kept.values()))
+            self.materials.append(_material(text, kept, self._attributes, (self._start, end)))
 
     def _end(self) -> int:
         """Return where the element ends that is being closed: its closing tag, or one that closes itself."""
         return self.content.index(b">", self._parser.CurrentByteIndex) + 1
 
 
-def _material(text: str, density: str, attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
+def _material(text: str, kept: list[str], attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
     head = text[: text.index(">") + 1]
     if head.endswith("/>"):
         head = head[:-2].rstrip() + ">"
     refused = "" if attributes.get("type") != SHARED else "it is a rigid body."
     return DeckMaterial(
-        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, density), refused,
+        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, *kept), refused,
     )  # fmt: skip

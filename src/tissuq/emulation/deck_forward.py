@@ -165,7 +165,7 @@ class DeckForward(Forward):
                 f"are {', '.join(symbols)}."
             )
         if not self.law.is_isotropic:
-            raise InputError(f"material '{self.law.name}' has fibres, and cards are of isotropic ones: name another.")
+            raise InputError(f"material '{self.law.name}' has fibres, and decks are calibrated with isotropic ones.")
         self.read_deck.material(self.replaced)
         self.program.check_installed()
         extra_files(self.read_deck, self.also, Path())

@@ -2,10 +2,12 @@
 
 from tissuq.export.cards import CardFormat, Cards, CardSettings, card_format, card_formats
 from tissuq.export.code import Card, FECode
+from tissuq.export.fibres import CALCULIX_PREFIX
 from tissuq.export.formats import Abaqus, Ansys, CalculiX, FEBio, LSDyna
 from tissuq.export.table import Table
 
 __all__ = [
+    "CALCULIX_PREFIX",
     "Abaqus",
     "Ansys",
     "CalculiX",

@@ -158,12 +158,15 @@ class Cards:
         Sentences that the user must read: the law of the cards, its errors, and cards that are not stable.
     blocks : tuple of str
         The material of each draw alone, without comments and what makes a file of it; none of tables.
+    outside : str
+        What of the draws their blocks do not hold, in a sentence; nothing where they hold all.
     """
 
     files: Mapping[str, str]
     index: tuple[Mapping[str, Any], ...]
     warnings: tuple[str, ...]
     blocks: tuple[str, ...] = ()
+    outside: str = ""
 
 
 class CardFormat(ABC):

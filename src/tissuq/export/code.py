@@ -17,6 +17,7 @@ from tissuq.export.cards import (
     CardFormat,
     Cards,
     CardSettings,
+    card_formats,
     draw_row,
     ensemble_lines,
     file_name,
@@ -24,6 +25,7 @@ from tissuq.export.cards import (
     words_of,
 )
 from tissuq.export.draw_stresses import DrawStresses
+from tissuq.export.fibres import FIBRE_AXES, FibreForm, fibre_sentences, initial_stiffness
 from tissuq.export.judgement import JudgedLaw
 from tissuq.export.laws import Form, Law, exact_law
 from tissuq.export.projection import Projection, projections
@@ -87,6 +89,10 @@ class FECode(CardFormat):
     """In order of preference."""
     projections: ClassVar[tuple[Projection, ...]]
     """One of every family that the code has, the best of which is taken where it has not the draws' own law."""
+    fibres: ClassVar[str] = "its cards here are of isotropic materials"
+    """Which fibres its cards hold, or why none, in words."""
+    fibre_volumetric: ClassVar[str] = ""
+    """The volumetric energy of its materials with fibres, where it is another."""
 
     @abstractmethod
     def text(self, card: Card) -> str:
@@ -99,6 +105,14 @@ class FECode(CardFormat):
         """Return a file of comments and a card."""
         return heading + text
 
+    def beside(self, card: Card) -> str:
+        """Return what a file holds beside the material, and the material refers to."""
+        return ""
+
+    def outside(self, cards: Sequence[Card]) -> str:
+        """Return what of the draws their blocks do not hold, in a sentence, or nothing."""
+        return ""
+
     def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
         judged, rivals = self._best_law(ensemble, settings)
         shear = moduli(ensemble) * settings.factor
@@ -108,16 +122,18 @@ class FECode(CardFormat):
             )
         values = judged.law.scaled(settings.factor).values
         common = [*ensemble_lines(ensemble, settings), *self._law_lines(judged, settings)]
-        files, index, blocks, bulks = {}, [], [], []
-        for draw_index, modulus in enumerate(shear):
-            constants = judged.form.constants(judged.law.material, values[draw_index])
-            bulk = settings.bulk(float(modulus), float(shear.mean()))
+        all_constants = [judged.form.constants(judged.law.material, row) for row in values]
+        stiffness = shear + np.array([initial_stiffness(judged.form, constants) for constants in all_constants])
+        files, index, blocks, bulks, all_cards = {}, [], [], [], []
+        for draw_index, (modulus, constants) in enumerate(zip(shear, all_constants, strict=True)):
+            bulk = settings.bulk(float(stiffness[draw_index]), float(stiffness.mean()))
             card = Card(
                 judged.form, constants, float(modulus), bulk, settings.name, settings.number,
                 settings.system.water_density,
             )  # fmt: skip
             self.check(card)
             bulks.append(bulk)
+            all_cards.append(card)
             blocks.append(self.text(card))
             draw = ensemble[draw_index]
             row = {"file": file_name(ensemble, draw_index, self.suffix), **draw_row(draw, settings, card.shear)}
@@ -125,14 +141,15 @@ class FECode(CardFormat):
             row |= judged.row(draw_index)
             lines = [f"draw {draw_index + 1} of {len(ensemble)}: {words_of(draw, settings)}", *common]
             lines += judged.lines(draw_index)
-            files[str(row["file"])] = self.wrapped(self._commented(lines), blocks[-1])
+            files[str(row["file"])] = self.wrapped(self._commented(lines), self.beside(card) + blocks[-1])
             index.append(row)
         sentences = (
             *origin_sentences(ensemble),
             *judged.sentences(self.name, rivals),
-            *_softness(np.array(bulks) / shear),
+            *fibre_sentences(judged.form, all_constants),
+            *_softness(np.array(bulks) / stiffness),
         )
-        return Cards(files, tuple(index), sentences, tuple(blocks))
+        return Cards(files, tuple(index), sentences, tuple(blocks), self.outside(all_cards))
 
     def form_of(self, law: Law) -> Form | None:
         """Return the first form that holds a law, if any."""
@@ -143,6 +160,8 @@ class FECode(CardFormat):
         law = exact_law(ensemble) if settings.law is None else None
         form = self.form_of(law) if law is not None else None
         draws = DrawStresses(ensemble)
+        if form is None and not ensemble[0].is_isotropic:
+            raise InputError(self._why_no_fibres(ensemble, settings))
         if law is not None and form is not None:
             return JudgedLaw.of(draws, law, form, None), ()
         candidates = [self._projected(draws, projection) for projection in self._requested(settings)]
@@ -151,6 +170,21 @@ class FECode(CardFormat):
         if settings.law is not None and not best.is_near.all():
             rivals = [self._projected(draws, other) for other in self.projections if other != best.projection]
         return best, rivals
+
+    def _why_no_fibres(self, ensemble: Ensemble, settings: CardSettings) -> str:
+        """Return why draws with fibres have no card here, and which codes have one."""
+        name = ensemble[0].parts[0][0].name
+        if settings.law is not None:
+            return f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out."
+        law, codes = exact_law(ensemble), [kind() for kind in card_formats().values()]
+        able = sorted(code.name for code in codes if law and isinstance(code, FECode) and code.form_of(law))
+        advice = (
+            f"write cards for {' or '.join(able)}."
+            if able
+            else "no code here has all of it; a neo-Hookean matrix with one kind of fibres (holzapfel-gasser-ogden, "
+            "gasser-ogden-holzapfel, standard-reinforcing) has cards."
+        )
+        return f"material '{name}' has no card for {self.name} ({self.fibres}): {advice}"
 
     def _projected(self, draws: DrawStresses, projection: Projection) -> JudgedLaw:
         law = projection.law(draws)
@@ -171,8 +205,13 @@ class FECode(CardFormat):
         return [projection if settings.order is None else type(projection).of_order(settings.order)]
 
     def _law_lines(self, judged: JudgedLaw, settings: CardSettings) -> Iterator[str]:
-        yield f"form: {judged.form.keyword}, W = {judged.form.formula}; I1, I2, l of the isochoric part, l / J^(1/3)"
-        yield f"volume: U = {self.volumetric}; K is the bulk modulus"
+        has_fibres = isinstance(judged.form, FibreForm)
+        invariants = "I1, I4" if has_fibres else "I1, I2, l"
+        yield f"form: {judged.form.keyword}, W = {judged.form.formula}; {invariants} of the isochoric part, l / J^(1/3)"
+        volumetric = (has_fibres and self.fibre_volumetric) or self.volumetric
+        yield f"volume: U = {volumetric}; K is the bulk modulus"
+        if has_fibres:
+            yield FIBRE_AXES
         yield f"unit of stress: {settings.unit} ({settings.system.units})"
         yield f"checked: {self.checked}"
 

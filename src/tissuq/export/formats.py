@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 from tissuq.errors import InputError
 from tissuq.export.code import Card, FECode
+from tissuq.export.fibres import CALCULIX_PREFIX, FibreForm, directions
 from tissuq.export.laws import Constants, Form, LibraryForm, OgdenForm, PolynomialForm
 from tissuq.export.projection import (
     MixtureFit,
@@ -33,6 +34,9 @@ ANSYS_LINE = 6
 """Numbers on a line of data."""
 FEBIO_TERMS = 6
 """Terms of a polynomial of I1, and of an Ogden sum, that FEBio takes at most."""
+FIBRES = "k1/(2 k2) sum over families of (exp(k2 <I4 - 1>^2) - 1)"
+DISPERSED = FIBRES.replace("I4 - 1", "kappa (I1 - 3) + (1 - 3 kappa) (I4 - 1)")
+"""Energies of fibres, <x> being x where positive, else 0."""
 LS_DYNA_OGDEN_TERMS = 8
 LS_DYNA_TERMS = ("C10", "C01", "C11", "C20", "C02", "C30")
 LS_DYNA_KEYWORDS = {"MAT_077_H": "*MAT_HYPERELASTIC_RUBBER_TITLE", "MAT_077_O": "*MAT_OGDEN_RUBBER_TITLE"}
@@ -69,7 +73,10 @@ class Abaqus(FECode):
             VanDerWaals,
             lambda mu, A, Jm: {"mu": mu, "lambda_m": sqrt(Jm + 3), "a": A / mu, "beta": 0.0},
         ),
+        *(FibreForm(f"HOLZAPFEL, LOCAL DIRECTIONS={n}", f"C10 (I1 - 3) + {DISPERSED}", n) for n in (1, 2)),
     )
+    fibres = "it has fibres of one kind in a neo-Hookean matrix"
+    fibre_volumetric = "((J^2 - 1)/2 - ln J) / D, D = 2/K"
     projections: ClassVar[tuple[Projection, ...]] = (
         PolynomialFit(full_terms(4)),
         OgdenFit(6),
@@ -79,13 +86,35 @@ class Abaqus(FECode):
     """Value of D2 and D3 with which their volumetric terms vanish."""
 
     def text(self, card: Card) -> str:
+        if isinstance(card.form, FibreForm):
+            names, bulk = ("k1", "k2", "kappa"), 2 / card.bulk
+            data = _abaqus_lines([card.constants["C10"], bulk, *(card.constants[name] for name in names)])
+            head = [f"*MATERIAL, NAME={card.name}", f"*ANISOTROPIC HYPERELASTIC, {card.form.keyword}"]
+            return "".join(f"{line}\n" for line in [*head, *data])
         numbers = [*card.constants.values(), 2 / card.bulk, *[self.absent_d] * (_volumetric_terms(card.form) - 1)]
         lines = [f"*MATERIAL, NAME={card.name}", f"*HYPERELASTIC, {card.form.keyword}", *_abaqus_lines(numbers)]
         return "".join(f"{line}\n" for line in lines)
 
+    def beside(self, card: Card) -> str:
+        """Return the orientation that holds the directions of fibres, which Abaqus keeps apart from the material."""
+        if not isinstance(card.form, FibreForm):
+            return ""
+        rows = [f"{along:.15f}, {across:.15f}, 0." for along, across in directions(card.form, card.constants)]
+        head = f"*ORIENTATION, NAME={card.name}-AXES, LOCAL DIRECTIONS={card.form.families}"
+        return "".join(f"{line}\n" for line in [head, "1., 0., 0., 0., 1., 0.", "3, 0.", *rows])
+
+    def outside(self, cards: Sequence[Card]) -> str:
+        if not isinstance(cards[0].form, FibreForm) or len({card.constants["degrees"] for card in cards}) == 1:
+            return ""
+        return (
+            "Abaqus takes the directions of fibres from the *ORIENTATION of the section, not from the material, and "
+            "here the angle differs from draw to draw: run the cards of tissuq export, each with its orientation, take "
+            "CalculiX (--solver ccx), or fit fibres at a known angle (such as exponential-fibres@30)."
+        )
+
 
 class CalculiX(Abaqus):
-    """``*HYPERELASTIC`` of CalculiX, for up to three terms.
+    """``*HYPERELASTIC`` of CalculiX, for up to three terms; fibres as its user material ELASTIC_FIBER.
 
     It replaces every D below 1e-10 by its own default, so that D2 and D3 are so large that their terms vanish. Whether
     CalculiX computes what tissuq means is tested by running it on one element.
@@ -95,11 +124,34 @@ class CalculiX(Abaqus):
     description = "CalculiX *HYPERELASTIC include files"
     checked = "cards of this form were run in CalculiX on one element, and gave tissuq's stresses"
     volumetric = "(J - 1)^2 / D1, D1 = 2/K"
-    forms = _abaqus_forms(3, 3)
+    forms = (
+        *_abaqus_forms(3, 3),
+        *(FibreForm(f"{CALCULIX_PREFIX}, {n} of them", f"C10 (I1 - 3) + {FIBRES}", n, False) for n in (1, 2)),
+    )
+    fibres = "it has fibres without dispersion in a neo-Hookean matrix"
+    fibre_volumetric = volumetric
     projections = PolynomialFit(full_terms(3)), OgdenFit(3), ReducedFit(reduced_terms(3))
     absent_d = 1e20
     min_d1: ClassVar[float] = 1e-10
     """Smallest D1; below it CalculiX takes a Poisson's ratio of 0.475 instead."""
+
+    def text(self, card: Card) -> str:
+        if not isinstance(card.form, FibreForm):
+            return super().text(card)
+        is_named = card.name.upper().startswith(CALCULIX_PREFIX)
+        name = card.name if is_named else f"{CALCULIX_PREFIX}_{card.name}"
+        constants, numbers = card.constants, _abaqus_lines([card.constants["C10"], 2 / card.bulk])[0].split(", ")
+        for along, across in directions(card.form, constants):
+            numbers += [f"{along:.16f}", f"{across:.16f}", f"{constants['k1']:.10e}", f"{constants['k2']:.10e}"]
+        head = [f"*MATERIAL, NAME={name}", f"*USER MATERIAL, CONSTANTS={len(numbers)}"]
+        rows = [", ".join(numbers[start : start + ABAQUS_LINE]) for start in range(0, len(numbers), ABAQUS_LINE)]
+        return "".join(f"{line}\n" for line in [*head, *rows])
+
+    def beside(self, card: Card) -> str:
+        return ""
+
+    def outside(self, cards: Sequence[Card]) -> str:
+        return ""
 
     def check(self, card: Card) -> None:
         if 2 / card.bulk < self.min_d1:
@@ -153,6 +205,7 @@ class Ansys(FECode):
         LibraryForm("GENT", "-mu Jm/2 ln(1 - (I1 - 3)/Jm)", Gent, lambda mu, Jm: {"mu": mu, "Jm": Jm}),
     )
     projections = PolynomialFit(full_terms(3)), OgdenFit(6), ReducedFit(reduced_terms(5))
+    fibres = "the published formula of its TB,AHYPER does not say that compressed fibres bear no load"
 
     def text(self, card: Card) -> str:
         option, _, count = card.form.keyword.partition(", ")
@@ -225,13 +278,27 @@ class FEBio(FECode):
             lambda mu, b: {"c1": mu / b, "c2": b},
         ),
         FEBIO_MIXTURE,
+        FibreForm("Holzapfel-Gasser-Ogden", f"c/2 (I1 - 3) + {DISPERSED}", 2, matrix=("c", 2.0)),
+        FibreForm(
+            "Holzapfel-Gasser-Ogden",
+            f"c/2 (I1 - 3) + {DISPERSED}, two families at no angle, each with half of k1",
+            1,
+            only_along_axis=True,
+            matrix=("c", 2.0),
+            share=0.5,
+        ),
     )
+    fibres = "it has two families of one kind in a neo-Hookean matrix, or one along axis 1 (:one@0)"
+    fibre_volumetric = "((J^2 - 1)/2 - ln J) K/2"
     projections = MixtureFit(FEBIO_TERMS), OgdenFit(FEBIO_TERMS), ReducedFit(reduced_terms(FEBIO_TERMS))
 
     def text(self, card: Card) -> str:
         head = f'    <material id="{card.number}" name={quoteattr(card.name)} type="{card.form.keyword}">'
         lines = [head, _element("density", card.water_density)]
-        if isinstance(card.form, Mixture):
+        if isinstance(card.form, FibreForm):
+            named = {"gamma" if name == "degrees" else name: number for name, number in card.constants.items()}
+            lines += starmap(_element, {**named, "k": card.bulk}.items())
+        elif isinstance(card.form, Mixture):
             lines.append(_element("k", card.bulk))
             for solid_form in card.form.summands:
                 prefix = f"{solid_form.keyword}_"

@@ -35,7 +35,7 @@ class JudgedLaw:
     projection : Projection or None
         That it is of; None where it is the draws' own law.
     errors : mapping of str to (N, n) array
-        As `DrawStresses.errors` returns them.
+        As `DrawStresses.errors` returns them; none of fibres, of which no law is projected.
     stable, stable_beyond : (N,) arrays of bool
         Over the range that was measured, and up to the last of `REACHES`.
     """
@@ -52,7 +52,8 @@ class JudgedLaw:
         """Return the judgement of a law in the place of draws."""
         cards = law.ensemble(draws.ensemble)
         stable = are_stable(cards), are_stable(cards, REACHES[-1])
-        return cls(law, form, projection, draws.errors(cards), *stable)
+        errors = draws.errors(cards) if law.material.is_isotropic else {}
+        return cls(law, form, projection, errors, *stable)
 
     @property
     def is_near(self) -> NDArray[np.bool_]:

@@ -67,11 +67,14 @@ def exact_law(ensemble: Ensemble) -> Law | None:
     """Return the one law that all draws are, exactly; None where they have a free energy, or are no such sum.
 
     Polynomials add up to a Rivlin polynomial, Ogden terms (with those of Mooney and Rivlin, if any) to an Ogden sum;
-    any other material stands alone.
+    any other material stands alone. Fibres are added to a polynomial.
     """
     if any(draw.discrepancy is not None for draw in ensemble):
         return None
     summands = list(parts_of(ensemble))
+    fibres = [part for part in summands if not part[0].is_isotropic]
+    if fibres:
+        return _with_fibres([part for part in summands if part[0].is_isotropic], fibres)
     if all(isinstance(material, POLYNOMIALS) for material, _ in summands):
         return _polynomial(summands)
     terms = [_ogden_terms(material, values) for material, values in summands]
@@ -79,6 +82,14 @@ def exact_law(ensemble: Ensemble) -> Law | None:
         moduli, exponents = (np.hstack([term[k] for term in terms if term is not None]) for k in (0, 1))
         return Law(Ogden(moduli.shape[1]), np.hstack([moduli, exponents]))
     return Law(*summands[0]) if len(summands) == 1 else None
+
+
+def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[Material, FloatArray]]) -> Law | None:
+    """Return the sum of a polynomial and fibres, if they are one."""
+    if not all(isinstance(material, POLYNOMIALS) for material, _ in matrix):
+        return None
+    parts = [_polynomial(matrix), *(Law(*part) for part in fibres)]
+    return Law(MaterialSum.of(*(part.material for part in parts)), np.hstack([part.values for part in parts]))
 
 
 def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:

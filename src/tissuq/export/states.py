@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.stability import stable_draws
-from tissuq.experiments.modes import Deformation, Path, SimpleShear, curve_modes
+from tissuq.assessment.stability import stability_modes, stable_draws
+from tissuq.experiments.modes import Deformation, Path, SimpleShear
+from tissuq.export.laws import parts_of
 from tissuq.mechanics.arithmetic import exp, library
-from tissuq.posterior.ensemble import Ensemble
+from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
 __all__ = [
     "ANGLES",
@@ -113,8 +114,12 @@ def mode_stretches(low: float, high: float) -> FloatArray:
 
 
 def moduli(ensemble: Ensemble) -> FloatArray:
-    """Return the initial shear moduli (N,) of draws, MPa, to which a discrepancy that is an energy adds nothing."""
+    """Return the initial shear moduli (N,) of draws, MPa, to which energy discrepancies and fibres add nothing."""
     without_discrepancy = tuple(replace(draw, discrepancy=None, continuation=None) for draw in ensemble)
+    if not ensemble[0].is_isotropic:
+        parts = [part for part in parts_of(ensemble) if part[0].is_isotropic]
+        matrices = (tuple((material, tuple(values[row])) for material, values in parts) for row in range(len(ensemble)))
+        without_discrepancy = tuple(EnergyDraw(number, matrix, None) for number, matrix in enumerate(matrices))
     return initial_slope(replace(ensemble, draws=without_discrepancy).stress(SimpleShear(), SHEARS).T)
 
 
@@ -131,8 +136,8 @@ def are_stable(ensemble: Ensemble, reach: float = 1.0) -> NDArray[np.bool_]:
         selected = replace(ensemble, draws=tuple(ensemble[int(index)] for index in indices))
         return selected.stresses_at
 
-    all_isotropic = np.ones(len(ensemble), dtype=bool)
-    return stable_draws(curves_of, all_isotropic, ensemble.model.experiment, curve_modes(), reach)
+    are_isotropic = np.full(len(ensemble), ensemble[0].is_isotropic)
+    return stable_draws(curves_of, are_isotropic, ensemble.model.experiment, stability_modes(ensemble[0]), reach)
 
 
 def _ray(max_invariants: tuple[float, float], angle: float) -> FloatArray:

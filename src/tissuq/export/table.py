@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.errors import InputError
 from tissuq.export.cards import (
     CardFormat,
     Cards,
@@ -39,6 +40,11 @@ class Table(CardFormat):
     description = "CSV tables of W1 and W2 against the invariants, exact for every draw"
 
     def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
+        if not ensemble[0].is_isotropic:
+            raise InputError(
+                f"material '{ensemble[0].parts[0][0].name}' has fibres, and W1 and W2 do not tell its stress: write "
+                "cards for a finite-element code, such as calculix or abaqus."
+            )
         states = SeenStates(ensemble.most, ANGLES)
         stress = ensemble.stress(states, states.points) * settings.factor
         shear = moduli(ensemble) * settings.factor

@@ -266,14 +266,14 @@ def distortional_energy(material: Material, values: ArrayLike | None = None) -> 
     ModelError
         When the material has fibres, or there is not one value for each parameter.
     """
-    if isinstance(material, EnergyDraw):
-        kinds, numbers = zip(*material.parts, strict=True)
-        return DistortionalEnergy(kinds, numbers, material.discrepancy, material.continuation)
     if not material.is_isotropic:
         raise ModelError(
             f"material '{material.name}' has fibres; finite elements are available for isotropic materials only, which "
             "depend on the principal stretches alone."
         )
+    if isinstance(material, EnergyDraw):
+        kinds, numbers = zip(*material.parts, strict=True)
+        return DistortionalEnergy(kinds, numbers, material.discrepancy, material.continuation)
     parameter_values = tuple(map(float, np.atleast_1d(np.asarray([] if values is None else values, dtype=np.float64))))
     if len(parameter_values) != len(material.parameters):
         symbols = ", ".join(parameter.symbol for parameter in material.parameters)

@@ -14,11 +14,11 @@ from typing import Any, Literal, get_args, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment.stability import calibrated_range, stable_draws
+from tissuq.assessment.stability import calibrated_range, stability_modes, stable_draws
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.headed_tables import headed
-from tissuq.experiments.modes import LoadingMode, Path, States, curve_modes, loading_mode
+from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution, are_isotropic
@@ -52,7 +52,8 @@ MOST_TRIES = 64
 class EnergyDraw(StretchMaterial):
     """One draw of a posterior as a material without free parameters.
 
-    Beyond the range of the data of its discrepancy, its energy goes on along rays (`tissuq.mechanics.rays`).
+    Beyond the range of the data of its discrepancy, its energy goes on along rays (`tissuq.mechanics.rays`). A material
+    with fibres has no such discrepancy, and an energy of the deformation, not of the stretches alone.
 
     Attributes
     ----------
@@ -99,9 +100,22 @@ class EnergyDraw(StretchMaterial):
         material, values = self.parts[0]
         return {parameter.symbol: value for parameter, value in zip(material.parameters, values, strict=True)}
 
+    @property
+    def is_isotropic(self) -> bool:  # type: ignore[override]
+        """Whether all parts are."""
+        return all(material.is_isotropic for material, _ in self.parts)
+
     def energy(self, stretches: tuple[Any, Any, Any], values: Any = ()) -> Any:
         materials, parameters = zip(*self.parts, strict=True)
         return sum_of_energies(materials, parameters, stretches, self.discrepancy, self.continuation)
+
+    def energy_of(self, deformation: Deformation, values: Any = ()) -> Any:
+        if self.is_isotropic:
+            return self.energy(deformation.stretches)
+        return sum(material.energy_of(deformation, parameters) for material, parameters in self.parts)
+
+    def why_not(self, deformation: Deformation) -> str:
+        return next(filter(None, (material.why_not(deformation) for material, _ in self.parts)), "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +133,8 @@ class Ensemble(Sequence[EnergyDraw]):
     tried : int
         Draws among which the admissible ones were found.
     ranges : mapping of str to (float, float)
-        Stretches of each loading mode of one stretch between which both invariants were measured.
+        Stretches of each loading mode of one stretch between which both invariants were measured; with fibres, measured
+        stretches along the axes of the test.
     origin : str
         Where the draws come from, in words, where that is no fit of measurements: a new patient of a population.
     """
@@ -250,7 +265,7 @@ def drawn_ensemble(
     Parameters
     ----------
     solution : Solution
-        Of an isotropic material, and a discrepancy that is an energy, has none, or adds the terms of another material.
+        Of a discrepancy that is an energy (of an isotropic material), has none, or adds the terms of another material.
         Of an average, energies with a preferred direction are left out.
     count : int
     seed : int
@@ -269,7 +284,7 @@ def drawn_ensemble(
     model = solution.model
     _check(model, count, seed, sampling)
     solution, all_isotropic = _isotropic(solution), np.ones(count, dtype=bool)
-    modes, draws, tried = curve_modes(), list[EnergyDraw](), 0
+    modes, draws, tried = stability_modes(model.material), list[EnergyDraw](), 0
     while len(draws) < count:
         if tried >= MOST_TRIES * count:
             raise ModelError(
@@ -280,11 +295,12 @@ def drawn_ensemble(
         batch = _materials(solution, count, [seed, tried // count], sampling)
         stable = all_isotropic
         if admissible:
-            stable = stable_draws(partial(_curves, batch), all_isotropic, model.experiment, modes)
+            has_axes = all_isotropic if model.material.is_isotropic else ~all_isotropic
+            stable = stable_draws(partial(_curves, batch), has_axes, model.experiment, modes)
         accepted = np.flatnonzero(stable)[: count - len(draws)]
         draws += [batch[index] for index in accepted]
         tried += int(accepted[-1]) + 1 if len(draws) == count else count
-    ranges = {mode.name: calibrated_range(model.experiment, mode) for mode in modes}
+    ranges = _ranges(model, modes)
     numbered = tuple(replace(draw, number=number) for number, draw in enumerate(draws))
     admissible_in = tuple(mode.name for mode in modes) if admissible else ()
     return Ensemble(numbered, model, admissible_in, tried, ranges, "" if solution.is_of_data else solution.reason)
@@ -331,14 +347,28 @@ def _curves(draws: Sequence[EnergyDraw], indices: NDArray[np.intp]) -> Callable[
     return partial(_stress, [draws[index] for index in indices])
 
 
+def _ranges(model: StatisticalModel, modes: Sequence[LoadingMode]) -> dict[str, tuple[float, float]]:
+    """Return the measured stretches of modes; with fibres, those along the axes of the test."""
+    if model.material.is_isotropic:
+        return {mode.name: calibrated_range(model.experiment, mode) for mode in modes}
+    columns = np.sqrt(1 + model.experiment.states.axis_strains[0]).T
+    return {
+        f"axis {axis}": (min(1.0, *map(float, column)), max(1.0, *map(float, column)))
+        for axis, column in enumerate(columns, start=1)
+    }
+
+
 def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> None:
     if count < 1:
         raise InputError(f"an ensemble has one draw or more, not {count}.")
     check_seed(seed)
     if sampling not in get_args(Sampling):
         raise InputError(f"sampling must be one of {', '.join(get_args(Sampling))}, not '{sampling}'.")
-    if not model.material.is_isotropic:
-        raise ModelError(f"material '{model.material.name}' has fibres; draws as materials are of isotropic ones only.")
+    if not model.material.is_isotropic and model.energy_symbols:
+        raise ModelError(
+            f"material '{model.material.name}' has fibres, and draws with an energy discrepancy are materials that no "
+            "finite-element program knows: fit without it (--discrepancy none, in Python discrepancy='none')."
+        )
     if not model.discrepancy.is_energy:
         raise ModelError(
             f"discrepancy '{model.discrepancy.name}' is an error of the measured stress and no material: fit with one "

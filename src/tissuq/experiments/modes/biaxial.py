@@ -1,4 +1,4 @@
-"""Modes with two stresses in the plane of a sheet whose faces are free: biaxial, a thin tube, one axis held."""
+"""Modes in the plane of a sheet whose faces are free: biaxial, a thin tube, one axis held, stretches imposed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tissuq.experiments.modes.mode import Control, LoadingMode
 from tissuq.experiments.modes.one_control import Planar
 from tissuq.experiments.modes.path import Deformation, Path
 
-__all__ = ["Biaxial", "ConstrainedUniaxial", "ThinTube"]
+__all__ = ["Biaxial", "ConstrainedUniaxial", "ImposedStretches", "ThinTube"]
 
 
 def _sheet(stretch_1: Any, stretch_2: Any) -> Deformation:
@@ -121,3 +121,29 @@ class ConstrainedUniaxial(LoadingMode):
     @property
     def paths(self) -> tuple[Path, ...]:
         return Planar().path, _Held()
+
+
+@dataclass(frozen=True)
+class ImposedStretches(LoadingMode):
+    """The principal stretches of a mode of one stretch, imposed along the axes of the test whatever the material.
+
+    Its stress is what does work on the stretch of the mode. It is no test, and has no place among the modes by name.
+
+    Attributes
+    ----------
+    mode : LoadingMode
+    axis : int
+        The axis, 1 or 2, along which the first of its stretches is.
+    """
+
+    mode: LoadingMode
+    axis: int = 1
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """The name of the mode, and of its axis."""
+        return f"{self.mode.name} along axis {self.axis}"
+
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        first, second, third = self.mode.principal_stretches(point)
+        return (first, second, third) if self.axis == 1 else (second, first, third)

@@ -1,0 +1,112 @@
+"""Fibres in a neo-Hookean matrix, in the notation of the finite-element codes that have them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import cos, degrees, pi, sin
+
+from tissuq.export.laws import Constants, Form
+from tissuq.mechanics import FibreMaterial, Material
+from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, MaterialSum, Rivlin, StandardFibres
+
+__all__ = [
+    "CALCULIX_PREFIX",
+    "FIBRE_AXES",
+    "QUADRATIC_RATE",
+    "FibreForm",
+    "directions",
+    "fibre_sentences",
+    "initial_stiffness",
+]
+
+CALCULIX_PREFIX = "ELASTIC_FIBER"
+"""What the name of a material begins with that CalculiX takes for one with fibres."""
+QUADRATIC_RATE = 1e-6
+"""The rate k2 with which exponential fibres are written for quadratic ones: the stress of fibres of strain E = I4 - 1
+is larger by a share of k2 E^2."""
+FIBRE_AXES = (
+    "fibres: at the angles phi and -phi (one family: at phi) from axis 1 towards axis 2 of the test; axis 1 is the "
+    "first local axis of the section's orientation (of mat_axis in FEBio), axis 2 the second"
+)
+WITHIN_UNIT = 1 - 1e-15
+"""Factor of the components of a direction, so that rounding leaves no more than unit length, which CalculiX refuses."""
+
+
+@dataclass(frozen=True)
+class FibreForm(Form):
+    """W = C10 (I1 - 3) + k1/(2 k2) sum over families of (exp(k2 <E>^2) - 1), E as in `DispersedFibres`.
+
+    Parameters
+    ----------
+    families : int
+        Of the fibres.
+    has_dispersion : bool
+        Whether the code has kappa.
+    only_along_axis : bool
+        Whether the fibres must lie along axis 1.
+    matrix : (str, float)
+        What the code calls the constant of the matrix, and that over C10.
+    share : float
+        The code's k1 over that of a family.
+    """
+
+    families: int
+    has_dispersion: bool = True
+    only_along_axis: bool = False
+    matrix: tuple[str, float] = ("C10", 1.0)
+    share: float = 1.0
+
+    def holds(self, material: Material) -> bool:
+        if not isinstance(material, MaterialSum) or len(material.summands) != 2:
+            return False
+        matrix, fibres = material.summands
+        if not isinstance(matrix, Rivlin) or matrix.terms != ("C10",) or not isinstance(fibres, FibreMaterial):
+            return False
+        kinds = (StandardFibres, ExponentialFibres, *[DispersedFibres] * self.has_dispersion)
+        is_placed = fibres.degrees == 0 or not self.only_along_axis
+        return isinstance(fibres, kinds) and fibres.families == self.families and is_placed
+
+    def constants(self, material: Material, values: Sequence[float]) -> Constants:
+        assert isinstance(material, MaterialSum)  # noqa: S101 (what it holds)
+        fibres = material.summands[1]
+        assert isinstance(fibres, FibreMaterial)  # noqa: S101
+        named = dict(zip((parameter.symbol for parameter in fibres.parameters), values[1:], strict=True))
+        name, factor = self.matrix
+        constants = {
+            name: factor * values[0],
+            "k1": self.share * named.get("k1", named.get("k", 0.0)),
+            "k2": named.get("k2", QUADRATIC_RATE),
+        }
+        if self.has_dispersion:
+            constants["kappa"] = named.get("kappa", 0.0)
+        return constants | {"degrees": degrees(named["phi"]) if fibres.degrees is None else fibres.degrees}
+
+
+def directions(form: FibreForm, constants: Mapping[str, float]) -> list[tuple[float, float]]:
+    """Return the components along axes 1 and 2 of the direction of every family."""
+    angle = constants["degrees"] * pi / 180
+    return [(WITHIN_UNIT * cos(angle), sign * WITHIN_UNIT * sin(angle)) for sign in (1, -1)[: form.families]]
+
+
+def initial_stiffness(form: Form, constants: Constants) -> float:
+    """Return a third of the stiffness of all fibres along them at rest, 4 k1 a family; nothing of other forms.
+
+    Added to the matrix's shear modulus it is the one on whose scale the bulk modulus is large.
+    """
+    return 4 / 3 * constants["k1"] / form.share * form.families if isinstance(form, FibreForm) else 0.0
+
+
+def fibre_sentences(form: Form, constants: Sequence[Constants]) -> Iterator[str]:
+    """Return what the user must read of cards with fibres."""
+    if not isinstance(form, FibreForm):
+        return
+    yield (
+        "Fibres lie from axis 1 of the test towards its axis 2, axes of the material's orientation in the model: give "
+        "the section one whose first axis is axis 1 of the test. Every file says where its fibres lie."
+    )
+    if any(draw["k2"] == QUADRATIC_RATE for draw in constants):
+        yield (
+            f"Quadratic fibres are written as exponential ones with k2 = {QUADRATIC_RATE:g}, whose stress is larger by "
+            f"{QUADRATIC_RATE:g} (I4 - 1)^2, relative to it."
+        )
