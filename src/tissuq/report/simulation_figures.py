@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -263,7 +265,8 @@ def write_vtu(
     fields = {name: mesh.vectors(values) if values.ndim > 1 else values for name, values in points.items()}
     blocks = {name: [values] for name, values in cells.items()}
     written = meshio.Mesh(mesh.vectors(mesh.points), [(mesh.kind.meshio, mesh.cells)], fields, blocks)
-    written.write(path, file_format="vtu", binary=False)
+    with redirect_stderr(StringIO()):  # meshio warns that text takes more room
+        written.write(path, file_format="vtu", binary=False)
 
 
 def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:
