@@ -329,6 +329,7 @@ def test_covariates_that_cannot_be_used_end_with_one_message(cli, here, rows, op
         (["specimens", "--new-patient", "age=60"], "it was fitted without covariates"),
         (["specimens", "--aim", "little"], "--aim needs a share such as 10% or 0.1, not 'little'"),
         (["specimens", "--aim", "0"], "aim"),
+        (["specimens", "--aim", "10"], "--aim needs a share such as 10% or 0.1, not '10'"),
         (["specimens", "--estimand", "tissue"], "which a population finds itself"),
         (["specimens", "--tolerance", "stress=much"], "is not a tolerance"),
         (["specimens", "--parameter", "C99"], "found: C99"),
