@@ -58,6 +58,8 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
         assert (folder / name).stat().st_size > 200, name
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "too few for a 95 % band" in page
+    assert "it takes more draws to tell them apart" in page
+    assert "is taken out first" not in page
     assert page.count("data:image/svg+xml") == 4
 
 
