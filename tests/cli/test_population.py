@@ -296,8 +296,12 @@ def test_covariates_may_stand_in_the_file_of_the_specimens(here):
     ("rows", "options", "words"),
     [
         ([(1, "X;3")], [], "covariates.csv, line 2, column 'specimen': there is no specimen 'X'"),
-        ([(3, "")], [], "covariates.csv: the covariates of specimen 'S2' are missing"),
-        ([(3, "S2;")], [], "covariates.csv, line 4, column 'age [year]': the value of 'age [year]' is missing"),
+        ([(3, "")], [], "covariates.csv: the covariates of specimen 'S2' are missing. Add a row, or leave out"),
+        (
+            [(3, "S2;")],
+            [],
+            "line 4, column 'age [year]': the value of 'age [year]' is missing. Fill it in, or leave out",
+        ),
         ([(3, "S1;20")], [], "covariates.csv, line 4, column 'specimen': specimen 'S1' has several rows"),
         ([(3, "S2;old")], [], "covariates.csv, line 4, column 'age [year]': 'old' is no number"),
         ([(3, "S2;5;6")], [], "covariates.csv, line 4: more cells than the 2 columns"),
@@ -329,6 +333,7 @@ def test_covariates_that_cannot_be_used_end_with_one_message(cli, here, rows, op
         (["specimens", "--new-patient", "age=60"], "it was fitted without covariates"),
         (["specimens", "--aim", "little"], "--aim needs a share such as 10% or 0.1, not 'little'"),
         (["specimens", "--aim", "0"], "aim"),
+        (["specimens", "--aim", "10"], "--aim needs a share such as 10% or 0.1, not '10'"),
         (["specimens", "--estimand", "tissue"], "which a population finds itself"),
         (["specimens", "--tolerance", "stress=much"], "is not a tolerance"),
         (["specimens", "--parameter", "C99"], "found: C99"),

@@ -40,6 +40,7 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
     folder = here / "runs" / "run-bar"
     assert said.status == 0, said.err
     assert "Case 'bar' with 3 draws" in said.out
+    assert "VTU" not in said.err
     assert str(folder.relative_to(here) / "report.html") in said.out
     rows = list(csv.DictReader((folder / "forces.csv").open(encoding="utf-8")))
     assert [float(row["elongation_mm"]) for row in rows] == [0.5, 1.0]
@@ -57,6 +58,8 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
         assert (folder / name).stat().st_size > 200, name
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "too few for a 95 % band" in page
+    assert "it takes more draws to tell them apart" in page
+    assert "is taken out first" not in page
     assert page.count("data:image/svg+xml") == 4
 
 
@@ -190,6 +193,13 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
         (["run", "--mesh", "none.msh", "--inflate", "ymax=2"], ["--inflate inner=2 --watch outer=x"]),
         (["run", "--case", "inflated"], ["give the mesh of the body, too"]),
         (["run", "--mesh", "none.msh"], ["needs one of --move ymax=y:-0.4"]),
+        (["run", "--mesh", "none.msh", "--case", "bar", "--move", "ymax=y:1"], ["has no --case"]),
+        (
+            ["run", "--mesh", "none.msh", "--move", "ymax=y:1", "--tip-radius", "2"],
+            ["--tip-radius goes with --press", "not --move"],
+        ),
+        (["run", "--case", "sphere", "--tip-radius", "2"], ["--mesh FILE", "--size NAME=VALUE"]),
+        (["run", "--case", "bar", "--parts", "2"], ["--mesh FILE", "--size NAME=VALUE"]),
         (["run", "--draws", "1"], ["draws", "greater than or equal to 2"]),
         (["run", "--discrepancy", "gp"], ["no discrepancy 'gp'", "auto"]),
     ],

@@ -154,7 +154,7 @@ def _pressure_of_tube(widening, inner=1.0, outer=1.5):
     return 1e3 * np.trapezoid(slope / (radii * hoop**2), radii)
 
 
-@pytest.mark.parametrize("shape", ["axisymmetric", "solid"])
+@pytest.mark.parametrize("shape", ["axisymmetric", "solid", "solid of 20 points"])
 def test_a_tube_under_pressure_widens_as_its_closed_form_says(tmp_path, shape):
     """In the solid a sector of three degrees, whose flat sides are held across themselves, is nearly the tube."""
     expected = _pressure_of_tube(0.2)
@@ -163,17 +163,20 @@ def test_a_tube_under_pressure_widens_as_its_closed_form_says(tmp_path, shape):
             _ring(tmp_path / "ring.vtu"), {"ymin": "y", "ymax": "y"}, press="xmin", distance=expected,
             shape=shape, watch="xmin", direction="x",
         )  # fmt: skip
+        mean_cosine = 1.0
     else:
-        ring = fem.Cube(a=(1.0, 0.0, 0.0), b=(1.5, np.pi / 2, 0.1), n=(13, 31, 2))
+        kind, n = ("hexahedron", (13, 31, 2)) if shape == "solid" else ("hexahedron20", (4, 11, 2))
+        ring = fem.Cube(a=(1.0, 0.0, 0.0), b=(1.5, np.pi / 2, 0.1), n=n)
+        ring = ring if shape == "solid" else ring.add_midpoints_edges()
         radius, angle, height = ring.points.T
         points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
         inside = np.flatnonzero(np.isclose(radius, 1.0))
-        written = meshio.Mesh(points, [("hexahedron", ring.cells)], point_sets={"inside": inside})
+        written = meshio.Mesh(points, [(kind, ring.cells)], point_sets={"inside": inside})
         written.write(tmp_path / "tube.inp")
         hold = {"xmin": "x", "ymin": "y", "zmin": "z", "zmax": "z"}
         case = InflatedBody(str(tmp_path / "tube.inp"), hold, press="inside", distance=expected, watch="inside")
+        mean_cosine = np.cos(angle[inside]).mean()
     found = respond(case, YEOH, VALUES, steps=2, bulk_ratio=1e5)
-    mean_cosine = 1.0 if shape == "axisymmetric" else np.cos(np.linspace(0, np.pi / 2, 31)).mean()
     assert found.force[-1] / mean_cosine == pytest.approx(0.2, rel=5e-3)
     assert found.problem == ""
 
@@ -232,6 +235,10 @@ def test_groups_of_gmsh_are_sets(tmp_path):
         ("quad", {"distance": 0.0}, "a number of mm other than zero, not 0"),
         ("quad", {"press": "ymin"}, "either a set that moves or one that is pressed"),
         ("quad8", {"move": "", "press": "ymax"}, "cannot be pressed against cells"),
+        ("quad", {"tip_radius": 1.0}, "give press, not move"),
+        ("quad", {"move": "", "press": "ymax"}, "moves along y would begin inside the body at the set 'ymax'"),
+        ("quad", {"move": "", "press": "ymin", "distance": -0.1}, "moves along -y would begin inside the body"),
+        ("quad", {"move": "", "press": "ymin"}, "'ymin' that the tip comes to are held along y"),
         ("hexahedron", {"shape": "", "hold": {"ymin": "y"}}, r"free to move or turn as a whole \(3 of 6 ways\)"),
     ],
 )
@@ -241,12 +248,40 @@ def test_what_cannot_be_is_refused(tmp_path, name, options, reason):
         BodyFromFile(_written(tmp_path / "block.vtu", name), **options)
 
 
+def test_a_rim_that_is_held_may_be_of_the_set_that_a_sphere_is_pressed_on_in_its_middle(tmp_path):
+    file = _written(tmp_path / "block.vtu", "quad")
+    options = {"hold": {"xmax": "xy", "xmin": "x"}, "press": "ymax", "distance": -0.3, "shape": "axisymmetric"}
+    assert BodyFromFile(file, tip_radius=1.0, **options).supports(_meshes()["quad"].points).load.radius == 1.0
+    with pytest.raises(InputError, match="are held along y"):
+        BodyFromFile(file, **options)
+
+
+@pytest.mark.parametrize(
+    ("name", "watch", "reason"),
+    [
+        ("quad", "q", "displacement of the set 'xmax' is along x, y, not 'q'"),
+        ("quad", "", "displacement of the set 'xmax' is along x, y, not ''"),
+        ("triangle6", "x", "a pressure cannot act on triangles of 6 points"),
+    ],
+)
+def test_a_pressure_that_cannot_be_is_refused(tmp_path, name, watch, reason):
+    with pytest.raises(InputError, match=reason):
+        InflatedBody(
+            _written(tmp_path / "block.vtu", name), {"ymin": "y"}, press="xmin", distance=0.1, shape="axisymmetric",
+            watch="xmax", direction=watch,
+        )  # fmt: skip
+
+
 def test_files_that_hold_no_such_mesh_are_refused(tmp_path):
     (tmp_path / "text.msh").write_text("nothing\n", encoding="utf-8")
     linear = fem.Rectangle(n=2).triangulate()
     meshio.Mesh(linear.points, [("triangle", linear.cells)]).write(tmp_path / "linear.vtu")
+    points = np.pad(_meshes()["quad"].points, ((0, 0), (0, 1)))
+    points[3, 0] = np.nan
+    meshio.Mesh(points, [("quad", _meshes()["quad"].cells)]).write(tmp_path / "nan.vtu")
     for file, reason in (
         ("text.msh", "cannot be read as a mesh"),
+        ("nan.vtu", "points whose coordinates are no numbers"),
         ("linear.vtu", r"cells triangle; use one of quad, .*gmsh -order 2"),
         ("none.msh", "none.msh' cannot be read"),
     ):

@@ -53,11 +53,15 @@ class InflatedBody(BodyFromFile):
     def __post_init__(self) -> None:
         super().__post_init__()
         mesh, _ = self._mesh_and_sets()
-        if self.direction not in AXES[: mesh.points.shape[1]]:
-            wanted = ", ".join(AXES[: mesh.points.shape[1]])
-            raise InputError(f"the displacement of the set '{self.watch}' is along {wanted}, not '{self.direction}'.")
         if mesh.kind.meshio in WITHOUT_PRESSURE:
             raise InputError(f"a pressure cannot act on {mesh.kind.plural}; use quadrilaterals or hexahedra.")
+
+    def _check_pressed(self) -> None:
+        axes = AXES[: self._found().points.shape[1]]
+        if not self.direction or self.direction not in axes:
+            raise InputError(
+                f"the displacement of the set '{self.watch}' is along {', '.join(axes)}, not '{self.direction}'."
+            )
 
     @property
     def _named(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from hashlib import sha256
 from io import StringIO
 from math import inf
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +98,8 @@ def _used(path: Path, found: Any) -> MeshFile:
     cells = cells.reshape(len(cells.ravel()) // blocks[0].data.shape[1], -1)
     dimensions = names[kinds[0]]
     points = np.asarray(found.points, dtype=np.float64)[used]
+    if not np.isfinite(points).all():
+        raise InputError(f"'{path}' has points whose coordinates are no numbers; write the mesh again.")
     size = float(np.ptp(points, axis=0).max())
     if points[:, dimensions:].size and np.ptp(points[:, dimensions:], axis=0).max() > NEARLY * size:
         raise InputError(f"'{path}' has plane cells in space; they must lie in the x-y plane.")
@@ -213,8 +215,8 @@ class BodyFromFile(Case):
             raise InputError(f"a body of the shape {shape} moves along {wanted}, not '{self.axis}'.")
         if shape == "axisymmetric" and found.points[:, 0].min() < -NEARLY * float(np.ptp(found.points)):
             raise InputError(f"the mesh '{self.file}' has points at negative x, the distance from the axis.")
-        if self.press and self._mesh_and_sets()[0].kind.meshio in WITHOUT_CONTACT:
-            raise InputError(f"a tip cannot be pressed against cells of the mesh '{self.file}'; use linear ones.")
+        self._check_sets()
+        self._check_pressed()
         self._check_held()
 
     def content(self) -> bytes:
@@ -279,8 +281,8 @@ class BodyFromFile(Case):
         cells = np.where(turned[:, None], found.cells[:, order], found.cells)
         return mesh._replace(cells=cells), found.sets
 
-    def _check_held(self) -> None:
-        """Refuse sets that there are not, and supports that leave the body free to move as a whole."""
+    def _check_sets(self) -> None:
+        """Refuse sets, and directions in which they are held, that there are not."""
         mesh, sets = self._mesh_and_sets()
         axes = AXES[: mesh.points.shape[1]]
         for name in (*(self.hold or {}), *self._named):
@@ -291,6 +293,34 @@ class BodyFromFile(Case):
         for name, directions in (self.hold or {}).items():
             if not directions or set(directions) - set(axes):
                 raise InputError(f"the set '{name}' is held in directions such as {axes}, not '{directions}'.")
+
+    def _check_pressed(self) -> None:
+        """Refuse a tip that cannot be pressed against cells, begins on the wrong side of them, or meets held points."""
+        if not self.press:
+            if self.tip_radius:
+                raise InputError("a tip has a radius where it is pressed against a set: give press, not move.")
+            return
+        mesh, _ = self._mesh_and_sets()
+        if mesh.kind.meshio in WITHOUT_CONTACT:
+            raise InputError(f"a tip cannot be pressed against cells of the mesh '{self.file}'; use linear ones.")
+        supports = self.supports(mesh.points)
+        tip, heights = cast(RigidTip, supports.load), supports.direction * mesh.points[:, AXIAL]
+        begun = heights - supports.direction * tip.start
+        touched = (tip.points & (begun < NEARLY * np.ptp(mesh.points)))[mesh.cells]
+        if (touched * (heights[mesh.cells] - heights[mesh.cells].mean(axis=1, keepdims=True))).sum() >= 0:
+            raise InputError(
+                f"a tip that moves along {'-' * (self.distance < 0)}{self.axis} would begin inside the body at the set "
+                f"'{self.press}': change the sign of the distance, or the set."
+            )
+        across = np.linalg.norm(np.delete(mesh.points, AXIAL, axis=1), axis=1)
+        behind = tip.radius - np.sqrt(np.maximum(tip.radius**2 - across**2, 0)) if np.isfinite(tip.radius) else 0.0
+        in_reach = tip.points & (begun + behind < self.travel) & (across <= tip.radius)
+        if (in_reach & supports.fixed[:, AXIAL]).any():
+            raise InputError(f"points of the set '{self.press}' that the tip comes to are held along {self.axis}.")
+
+    def _check_held(self) -> None:
+        """Refuse supports that leave the body free to move as a whole."""
+        mesh = self._mesh_and_sets()[0]
         supports = self.supports(mesh.points)
         held = supports.fixed.copy()
         held[:, AXIAL] |= supports.moved
@@ -299,7 +329,7 @@ class BodyFromFile(Case):
         if free:
             raise InputError(
                 f"the supports leave the body of '{self.file}' free to move or turn as a whole ({free} of "
-                f"{len(motions)} ways): hold more sets, such as ymin={axes}."
+                f"{len(motions)} ways): hold more sets, such as ymin={AXES[: mesh.points.shape[1]]}."
             )
 
 

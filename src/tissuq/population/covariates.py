@@ -222,7 +222,10 @@ def covariates_of(given: Any, specimens: Sequence[str], place: Place | None = No
             f"{place(unknown[0], '')}: there is no specimen {_listed(unknown)}; the specimens are {_listed(specimens)}."
         )
     if missing := [name for name in specimens if name not in values]:
-        raise InputError(f"{place('', '')}: the covariates of specimen {_listed(missing)} are missing.")
+        raise InputError(
+            f"{place('', '')}: the covariates of specimen {_listed(missing)} are missing. Add a row, or leave out the "
+            "specimen's tests."
+        )
     names = list(dict.fromkeys(str(name) for row in values.values() for name in row))
     if not names:
         raise InputError(f"{place('', '')}: there is no covariate.")
@@ -245,7 +248,10 @@ def _covariate(name: str, values: Mapping[str, Any], place: Place) -> Covariate:
     """Return the covariate of some values, by specimens."""
     for specimen, value in values.items():
         if value is None or str(value).strip().lower() in ("", "nan", "<na>", "none"):
-            raise InputError(f"{place(specimen, name)}: the value of '{name}' is missing. Fill it in.")
+            raise InputError(
+                f"{place(specimen, name)}: the value of '{name}' is missing. Fill it in, or leave out the specimen and "
+                "its tests, or the column."
+            )
     numbers = {specimen: _number(value) for specimen, value in values.items()}
     are_numbers = [number is not None for number in numbers.values()]
     if any(are_numbers) and not all(are_numbers):

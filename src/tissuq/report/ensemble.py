@@ -19,7 +19,7 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
-from tissuq.report.simulation_figures import LABELS, OF_SOURCES, shares_in
+from tissuq.report.simulation_figures import LABELS, of_sources, shares_in
 from tissuq.report.tables import significant
 from tissuq.studies.ensemble import EnsembleStudy
 from tissuq.studies.ensemble_files import DRAWS
@@ -236,8 +236,8 @@ def _sections(
     sections = [
         Section(f"{name} over time", _quantity(study, name, table, headers, figures)) for name, table in tables.items()
     ]
-    if shares_in(next(iter(tables.values())), is_shared=result.is_shared):
-        sentences = (*[SHARES] * result.is_shared, *[OF_SOURCES] * bool(result.sources))
+    if shares_in(first := next(iter(tables.values())), is_shared=result.is_shared):
+        sentences = (*[SHARES] * result.is_shared, *[of_sources(first)] * bool(result.sources))
         sections.append(Section("Sources of uncertainty", sentences))
     materials = [
         [name, ensemble.model.experiment.name, ensemble.model.material.name, ensemble.model.discrepancy.name,

@@ -16,12 +16,12 @@ from tissuq.finite_elements.spread import band_probability
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.simulation_figures import (
     LABELS,
-    OF_SOURCES,
     SHARES,
     force_figure,
     handy_unit,
     is_mesh_free,
     mesh_ratio,
+    of_sources,
     prefix_of,
     shares_in,
     simulation_figures,
@@ -278,7 +278,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
             f"Q is the {case.response} of a draw with its discrepancy, Q0 that of the same draw with its material "
             "parameters alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of "
             f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
-            *[OF_SOURCES] * bool(simulation.ensembles[COMPLETE].sources),
+            *[of_sources(table)] * bool(simulation.ensembles[COMPLETE].sources),
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
         )

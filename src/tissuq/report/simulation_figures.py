@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -23,13 +25,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LABELS",
-    "OF_SOURCES",
     "SHARES",
     "draw_shares",
     "force_figure",
     "handy_unit",
     "is_mesh_free",
     "mesh_ratio",
+    "of_sources",
     "prefix_of",
     "shares_in",
     "simulation_figures",
@@ -47,6 +49,10 @@ OF_SOURCES = (
     "What draws differ by independently of these is taken out first: **extrapolation**, how they go on beyond the "
     "measured range, and the **scale of tests**, the factor that all tests have in common (area, load cell; of a "
     "tissue the difference between specimens, too)."
+)
+IN_THE_OTHERS = (
+    "How draws go on beyond the measured range, and the factor that all tests have in common, are within these shares: "
+    "it takes more draws to tell them apart."
 )
 MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
@@ -77,6 +83,11 @@ def shares_in(table: Collection[str] | pd.DataFrame, *, is_shared: bool) -> list
     """Return the sources of variance that a table, or a row of one, has shares of, where there are several."""
     sources = [name for name in SHARES if name in table and name != "noise"]
     return sources if is_shared or len(sources) > 2 else []
+
+
+def of_sources(table: pd.DataFrame) -> str:
+    """Return what is said of sources that draws have besides parameters and discrepancy."""
+    return IN_THE_OTHERS if {"extrapolation", "test_scale"}.isdisjoint(table.columns) else OF_SOURCES
 
 
 def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str, Figure]:
@@ -263,7 +274,8 @@ def write_vtu(
     fields = {name: mesh.vectors(values) if values.ndim > 1 else values for name, values in points.items()}
     blocks = {name: [values] for name, values in cells.items()}
     written = meshio.Mesh(mesh.vectors(mesh.points), [(mesh.kind.meshio, mesh.cells)], fields, blocks)
-    written.write(path, file_format="vtu", binary=False)
+    with redirect_stderr(StringIO()):  # meshio warns that text takes more room
+        written.write(path, file_format="vtu", binary=False)
 
 
 def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:

@@ -99,9 +99,12 @@ def share(option: str) -> Callable[[str], float]:
     def parse(text: str) -> float:
         scale = 0.01 if text.strip().endswith("%") else 1.0
         try:
-            return scale * float(text.strip().removesuffix("%"))
+            number = float(text.strip().removesuffix("%"))
         except ValueError as error:
             raise InputError(f"{option} needs a share such as 10% or 0.1, not '{text}'.") from error
+        if scale == 1.0 and number > 1.0:  # whoever writes 10 means 10 %
+            raise InputError(f"{option} needs a share such as 10% or 0.1, not '{text}'.")
+        return scale * number
 
     return parse
 

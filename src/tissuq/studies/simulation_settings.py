@@ -23,6 +23,8 @@ __all__ = ["SimulationSettings"]
 BODY = "A body of your own"
 NUMBER = r"(?P<size>[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)"
 MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
+OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts")
+"""Options, besides the sets that are held, that say nothing without a mesh."""
 LOADS = {"move": MOVEMENT, "press": MOVEMENT, "inflate": re.compile(f"(?P<set>.+)={NUMBER}", re.IGNORECASE)}
 
 
@@ -112,15 +114,13 @@ class SimulationSettings(RunSettings):
 
         if self.mesh is not None:
             return self._body(beside / self.mesh)
-        if (
-            self.hold
-            or any(getattr(self, name) for name in LOADS)
-            or issubclass(find(Case, "case", self.case, InputError), BodyFromFile)
-        ):
-            raise InputError("give the mesh of the body, too: --mesh FILE --hold ymin=xyz --move ymax=y:-0.4.")
         kind = find(Case, "case", self.case, InputError)
-        if self.hold or any(getattr(self, name) for name in LOADS) or issubclass(kind, BodyFromFile):
-            raise InputError("give the mesh of the body, too: --mesh FILE --hold ymin=xyz --move ymax=y:-0.4.")
+        of_body = [name for name in OF_BODY if getattr(self, name) != type(self).model_fields[name].get_default()]
+        if self.hold or of_body or issubclass(kind, BodyFromFile):
+            raise InputError(
+                "give the mesh of the body, too: --mesh FILE --hold ymin=xyz --move ymax=y:-0.4; the sizes of a case "
+                "are --size NAME=VALUE."
+            )
         sizes = {field.name: field.default for field in fields(kind)}
         for name, value in self.sizes.items():
             if name not in sizes:
@@ -136,11 +136,14 @@ class SimulationSettings(RunSettings):
         from tissuq.finite_elements.mesh_file import BodyFromFile
 
         given = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
-        if len(given) != 1 or self.sizes or bool(self.watch) != bool(self.inflate):
+        is_of_case = self.sizes or self.case != type(self).model_fields["case"].default
+        if len(given) != 1 or is_of_case or bool(self.watch) != bool(self.inflate):
             raise InputError(
-                "a body from a mesh has no --size, and needs one of --move ymax=y:-0.4, --press ymax=y:-0.4, and "
-                "--inflate inner=2 --watch outer=x."
+                "a body from a mesh has no --case or --size, and needs one of --move ymax=y:-0.4, --press ymax=y:-0.4, "
+                "and --inflate inner=2 --watch outer=x."
             )
+        if self.tip_radius and not self.press:
+            raise InputError(f"--tip-radius goes with --press: write --press ymax=y:-0.4, not --{next(iter(given))}.")
         ((name, text),) = given.items()
         match = LOADS[name].fullmatch(text.strip())
         if match is None:
