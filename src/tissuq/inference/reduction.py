@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import States
 from tissuq.inference.threads import one_thread
+from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK, upper_triangle
@@ -204,8 +205,7 @@ class Reducer:
         model = self._models[0]
         n, bent = model.experiment.size, len(model.bent_symbols)
         if bent:
-            bases = (model.design_at(np.array(setting[:bent])) for setting in settings)
-            fits = (_Fit.of(self._models, basis) for basis in bases)
+            fits = (_Fit.of(self._models, design) for design in _designs(model, settings))
             pairs = zip(fits, settings, strict=True)
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
         is_plain = not model.is_correlated and not model.noise.depends_on_level
@@ -214,6 +214,15 @@ class Reducer:
         together = len(settings) if n <= FEW_POINTS else 1
         blocks = (settings[start : start + together] for start in range(0, len(settings), max(1, together)))
         return [reduction for block in blocks for reduction in _reduced(model, self._fit, block)]
+
+
+def _designs(model: StatisticalModel, settings: Sequence[tuple[float, ...]]) -> Iterator[FloatArray]:
+    """Yield `design_at` at the first values of settings, as many at once as their stresses are computed directly."""
+    bent = np.array([setting[: len(model.bent_symbols)] for setting in settings])
+    together = max(1, MAX_COMPLEX_STEP_VALUES // (len(model.states) * len(model.column_symbols)))
+    for start in range(0, len(bent), together):
+        bases = model.basis(model.states, bent[start : start + together])
+        yield from (np.asarray(model.rows(basis)) for basis in bases)
 
 
 @dataclass(frozen=True, eq=False)
