@@ -1,4 +1,4 @@
-"""A draw of a posterior, or an isotropic material with values, as a material of FElupe: energy, stress and tangent."""
+"""A draw of a posterior, or a material with values, as a material of FElupe: its energy, stress and tangent."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.energy_derivatives import gradient, gradient_and_hessian, is_arithmetic
-from tissuq.mechanics import Material
+from tissuq.finite_elements.fibre_energy import FibreEnergy, Fibres
+from tissuq.mechanics import FibreMaterial, Material
 from tissuq.mechanics.continuation import Continuation, sum_of_energies
+from tissuq.mechanics.material import MaterialSum
 from tissuq.mechanics.pieces import PiecewiseEnergy
 from tissuq.mechanics.stress import differentiator
 from tissuq.posterior.ensemble import EnergyDraw
@@ -37,23 +39,29 @@ class FElupeMaterial:
 
     It goes into `felupe.SolidBody`; without a bulk modulus, when it is the distortional part alone, into
     `felupe.SolidBodyNearlyIncompressible` or `felupe.NearlyIncompressible`, which have a bulk modulus of their own;
-    and with one into `felupe.ThreeFieldVariation`. It needs nothing of FElupe itself.
+    and with one into `felupe.ThreeFieldVariation`. It needs nothing of FElupe itself. The energy of fibres, which
+    J^(-1/3) F stretches, is added to that of their matrix.
 
     Parameters
     ----------
     material : Material
-        A draw of `Posterior.ensemble`, with the discrepancy in its energy, or any isotropic material.
+        A draw of `Posterior.ensemble`, with the discrepancy in its energy, or any material, with fibres or without.
     bulk_modulus : float
         K in MPa; zero for the distortional part alone.
     values : (k,) array, optional
         The parameters of a material that is no draw, in its order.
     unit : float
         MPa in which stresses are given: 1, or 0.001 for a mesh whose loads are in kPa.
+    directions : (2, 3) or (2, 3, q, c) array
+        Unit vectors along axis 1 and axis 2 of the test in the undeformed body, the same everywhere or at every
+        quadrature point of every cell: fibres lie at phi and -phi from axis 1 towards axis 2. Unless given, x and y;
+        an isotropic material has no use for them.
 
     Raises
     ------
     InputError, ModelError
-        When the bulk modulus is negative, the material has fibres, or values are missing.
+        When the bulk modulus is negative, values are missing, fibres have no matrix, or the directions are no two unit
+        vectors at a right angle.
 
     Examples
     --------
@@ -65,14 +73,30 @@ class FElupeMaterial:
     >>> stress = P[0, 0] - P[1, 1] * F[1, 1] / F[0, 0]  # the free sides give the pressure
     >>> float(stress[0, 0].round(9)), umat.hessian([F, None])[0].shape
     (1.75, (3, 3, 3, 3, 1, 1))
+
+    Fibres at 0 degrees from axis 1, along x and along y, where they are slack:
+
+    >>> law = tq.mechanics.material_named("neo-hookean+standard-fibres:one@0")
+    >>> for axes in ([[1, 0, 0], [0, 1, 0]], [[0, 1, 0], [-1, 0, 0]]):
+    ...     umat = tq.finite_elements.FElupeMaterial(law, 50.0, [0.5, 0.8], directions=axes)
+    ...     P, _ = umat.gradient([F, None])
+    ...     print((P[0, 0] - P[2, 2] * F[2, 2] / F[0, 0]).round(9))
+    [[11.35]]
+    [[1.75]]
     """
 
     def __init__(
-        self, material: Material, bulk_modulus: float = 0.0, values: ArrayLike | None = None, unit: float = 1.0
+        self,
+        material: Material,
+        bulk_modulus: float = 0.0,
+        values: ArrayLike | None = None,
+        unit: float = 1.0,
+        directions: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     ) -> None:
         if not 0 <= bulk_modulus < np.inf or not 0 < unit < np.inf:
             raise InputError(f"a bulk modulus is zero or a positive number of MPa, not {bulk_modulus!r}.")
-        self.energy = distortional_energy(material, values)
+        self.energy, fibres = _matrix_and_fibres(material, values)
+        self.fibres = FibreEnergy(fibres, np.asarray(directions, dtype=np.float64)) if fibres else None
         self.bulk_modulus = float(bulk_modulus)
         self.unit = float(unit)
         self.x: list[FloatArray] = [np.eye(3), np.zeros(0)]
@@ -84,6 +108,8 @@ class FElupeMaterial:
         stress = first_piola_kirchhoff(self.energy.slopes, F)
         if self.bulk_modulus:
             stress += volumetric_stress(self.bulk_modulus, F)
+        if self.fibres:
+            stress += self.fibres.derivative(1, x[0])
         return [(stress / self.unit).reshape(3, 3, *shape), x[-1]]
 
     def hessian(self, x: Sequence[Any]) -> list[Any]:
@@ -92,6 +118,8 @@ class FElupeMaterial:
         tangents = tangent(self.energy.derivatives, F)
         if self.bulk_modulus:
             tangents += volumetric_tangent(self.bulk_modulus, F)
+        if self.fibres:
+            tangents += self.fibres.derivative(2, x[0])
         return [(tangents / self.unit).reshape(3, 3, 3, 3, *shape)]
 
     def function(self, x: Sequence[Any]) -> list[Any]:
@@ -99,6 +127,8 @@ class FElupeMaterial:
         F, shape = _points(x[0])
         stretches = np.asarray(np.linalg.svd(np.moveaxis(F, -1, 0), compute_uv=False).T, dtype=np.float64)
         energy = self.energy(stretches) + self.bulk_modulus / 2 * (stretches.prod(axis=0) - 1) ** 2
+        if self.fibres:
+            energy += self.fibres.derivative(0, x[0])
         return [(energy / self.unit).reshape(shape)]
 
 
@@ -269,18 +299,47 @@ def distortional_energy(material: Material, values: ArrayLike | None = None) -> 
     if not material.is_isotropic:
         raise ModelError(
             f"material '{material.name}' has fibres; finite elements are available for isotropic materials only, which "
-            "depend on the principal stretches alone."
+            "depend on the principal stretches alone. For a model of your own, FElupeMaterial takes fibres."
         )
+    return _matrix_and_fibres(material, values)[0]
+
+
+Part = tuple[Material, tuple[float, ...]]
+"""A material with its parameters."""
+
+
+def _matrix_and_fibres(material: Material, values: ArrayLike | None) -> tuple[DistortionalEnergy, Fibres]:
+    """Return the energy of what is isotropic in a material, and its fibres."""
     if isinstance(material, EnergyDraw):
-        kinds, numbers = zip(*material.parts, strict=True)
-        return DistortionalEnergy(kinds, numbers, material.discrepancy, material.continuation)
-    parameter_values = tuple(map(float, np.atleast_1d(np.asarray([] if values is None else values, dtype=np.float64))))
-    if len(parameter_values) != len(material.parameters):
-        symbols = ", ".join(parameter.symbol for parameter in material.parameters)
+        wholes, beside = material.parts, (material.discrepancy, material.continuation)
+    else:
+        wholes, beside = ((material, _complete(material, values)),), (None, None)
+    parts = [part for whole in wholes for part in _parts(*whole)]
+    fibres = tuple((kind, numbers) for kind, numbers in parts if isinstance(kind, FibreMaterial))
+    matrix = [part for part in parts if not isinstance(part[0], FibreMaterial)]
+    if not matrix or not all(kind.is_isotropic for kind, _ in matrix):
         raise ModelError(
-            f"material '{material.name}' needs one value for each of {symbols}, and was given {parameter_values}."
+            f"material '{material.name}' is no sum of an isotropic matrix and fibres, which finite elements need, such "
+            "as 'neo-hookean+standard-fibres'."
         )
-    return DistortionalEnergy((material,), (parameter_values,))
+    kinds, parameters = zip(*matrix, strict=True)
+    return DistortionalEnergy(kinds, parameters, *beside), fibres
+
+
+def _parts(material: Material, values: tuple[float, ...]) -> list[Part]:
+    """Return the summands where some are fibres, and otherwise the material as it is."""
+    if isinstance(material, MaterialSum) and not material.is_isotropic:
+        return material.shares(values)
+    return [(material, values)]
+
+
+def _complete(material: Material, values: ArrayLike | None) -> tuple[float, ...]:
+    """Return the values of a material's parameters as numbers, one for each."""
+    numbers = tuple(map(float, np.atleast_1d(np.asarray([] if values is None else values, dtype=np.float64))))
+    if len(numbers) != len(material.parameters):
+        symbols = ", ".join(parameter.symbol for parameter in material.parameters)
+        raise ModelError(f"material '{material.name}' needs one value for each of {symbols}, and was given {numbers}.")
+    return numbers
 
 
 @lru_cache(maxsize=64)

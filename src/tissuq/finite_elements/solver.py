@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.case import AXIAL, Case
 from tissuq.finite_elements.loads import Action, load_on
-from tissuq.finite_elements.material import FElupeMaterial
+from tissuq.finite_elements.material import FElupeMaterial, distortional_energy
 from tissuq.mechanics import Material
 
 __all__ = ["CellFields", "Solver", "StrainPath", "felupe"]
@@ -91,8 +91,9 @@ class Solver:
         fem, mesh = felupe(), case.mesh()
         supports = case.supports(mesh.points)
         self._bulk_ratio = bulk_ratio
+        energy = distortional_energy(material, values)  # which refuses fibres: a case has no directions for them
         self._umat = FElupeMaterial(material, values=values)
-        self._modulus = self._umat.unit = _stiffness(material, self._umat.energy.initial_shear_modulus)
+        self._modulus = self._umat.unit = _stiffness(material, energy.initial_shear_modulus)
         region = getattr(fem, mesh.kind.region)(fem.Mesh(mesh.points, mesh.cells, mesh.kind.meshio))
         if mesh.is_solid or mesh.is_plane:
             field, width = fem.Field(region, dim=3) if mesh.is_solid else fem.FieldPlaneStrain(region, dim=2), 1.0

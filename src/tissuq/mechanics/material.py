@@ -156,18 +156,18 @@ class MaterialSum(Material):
         )
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
-        return sum(material.strain_energy(I1, I2, share) for material, share in self._shares(values))
+        return sum(material.strain_energy(I1, I2, share) for material, share in self.shares(values))
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
-        return sum(material.energy(stretches, share) for material, share in self._shares(values))
+        return sum(material.energy(stretches, share) for material, share in self.shares(values))
 
     def energy_of(self, deformation: Deformation, values: Any) -> Any:
-        return sum(material.energy_of(deformation, share) for material, share in self._shares(values))
+        return sum(material.energy_of(deformation, share) for material, share in self.shares(values))
 
     def why_not(self, deformation: Deformation) -> str:
         return next(filter(None, (material.why_not(deformation) for material in self.summands)), "")
 
-    def _shares(self, values: Any) -> list[tuple[Material, Any]]:
+    def shares(self, values: Any) -> list[tuple[Material, Any]]:
         """Return every summand with its values."""
         ends = pairwise(accumulate((len(material.parameters) for material in self.summands), initial=0))
         return [(material, values[start:end]) for material, (start, end) in zip(self.summands, ends, strict=True)]

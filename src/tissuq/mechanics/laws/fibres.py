@@ -86,7 +86,11 @@ class FibreMaterial(Material):
         if problem := self.why_not(deformation):
             raise ModelError(problem)
         I1 = sum(stretch * stretch for stretch in deformation.stretches)
-        C11, C22, C12 = deformation.plane
+        return self.energy_in_plane(I1, deformation.plane, values)
+
+    def energy_in_plane(self, I1: Any, plane: tuple[Any, Any, Any], values: Any) -> Any:
+        """Return the energy (MPa) from I1 and C11, C22, C12 in the plane of the fibres."""
+        C11, C22, C12 = plane
         if self._is_along_axis:
             return self.fibre_energy(I1, C11, values)
         law_values, angle = (values[:-1], values[-1]) if self.degrees is None else (values, radians(self.degrees))
