@@ -9,7 +9,7 @@ import pytest
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_mode
-from tissuq.finite_elements import BodyFromFile, InflatedBody, SphericalIndentation, first_order, respond
+from tissuq.finite_elements import BodyFromFile, InflatedBody, SphericalIndentation, first_order, respond, simulate
 from tissuq.finite_elements.mesh_file import read_mesh
 from tissuq.finite_elements.response import Solve
 from tissuq.finite_elements.solver import Solver
@@ -287,3 +287,21 @@ def test_files_that_hold_no_such_mesh_are_refused(tmp_path):
     ):
         with pytest.raises(InputError, match=reason):
             BodyFromFile(str(tmp_path / file), {"ymin": "xy"}, move="ymax", distance=1.0, shape="plane")
+
+
+def test_a_folded_cell_is_refused_with_its_place(tmp_path):
+    mesh = fem.Rectangle(b=(WIDTH, HEIGHT), n=3)
+    points = np.pad(mesh.points, ((0, 0), (0, 1)))
+    points[4] = 1.9, 2.9, 0.0  # the middle, nearly in the corner of one of four cells
+    meshio.Mesh(points, [("quad", mesh.cells)]).write(tmp_path / "folded.vtu")
+    with pytest.raises(InputError, match=r"folded or have no volume \(\d of 4, the first at x, y, z = "):
+        BodyFromFile(str(tmp_path / "folded.vtu"), {"ymin": "xy"}, move="ymax", distance=0.1, shape="plane")
+
+
+def test_few_full_runs_under_pressure_are_refused(posterior, tmp_path):
+    case = InflatedBody(
+        _ring(tmp_path / "ring.vtu", 4), {"ymin": "y", "ymax": "y"}, press="xmin", distance=0.05, shape="axisymmetric",
+        watch="xmax",
+    )  # fmt: skip
+    with pytest.raises(InputError, match="compute all draws in full"):
+        simulate(posterior, case, draws=6, steps=1, full_runs=4)

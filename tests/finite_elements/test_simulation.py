@@ -9,8 +9,8 @@ import pytest
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements import ClampedBar, Indentation, bar_force, respond, simulate
+from tissuq.finite_elements.library import felupe
 from tissuq.finite_elements.response import Solve, run_in_turn, solved
-from tissuq.finite_elements.solver import felupe
 from tissuq.finite_elements.warnings import simulation_warnings
 from tissuq.mechanics import material_named
 

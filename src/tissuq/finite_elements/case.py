@@ -105,6 +105,13 @@ class Mesh(NamedTuple):
         return f"{'' if self.is_solid else 'plane ' if self.is_plane else 'axisymmetric '}{self.kind.plural}"
 
     @property
+    def section_is(self) -> str:
+        """What `section` is, as a sentence begins."""
+        if self.is_half:
+            return "A section through the axis"
+        return "The body" if self.is_plane else "The side of the body across its thinnest direction"
+
+    @property
     def section(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Faces (p, 3 or 4) by their points that show a section, and the cells (p,) that they are of: the lowest."""
         faces = np.concatenate([self.cells[:, face] for face in self.kind.faces])

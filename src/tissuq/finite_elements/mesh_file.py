@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, CELL_KINDS, Case, FloatArray, Mesh, RigidTip, Supports
+from tissuq.finite_elements.library import felupe
 
 __all__ = ["BodyFromFile", "MeshFile", "read_mesh"]
 
@@ -215,6 +217,7 @@ class BodyFromFile(Case):
             raise InputError(f"a body of the shape {shape} moves along {wanted}, not '{self.axis}'.")
         if shape == "axisymmetric" and found.points[:, 0].min() < -NEARLY * float(np.ptp(found.points)):
             raise InputError(f"the mesh '{self.file}' has points at negative x, the distance from the axis.")
+        self._check_cells()
         self._check_sets()
         self._check_pressed()
         self._check_held()
@@ -280,6 +283,21 @@ class BodyFromFile(Case):
         turned = np.linalg.det(corners[:, ends] - corners[:, :1]) < 0
         cells = np.where(turned[:, None], found.cells[:, order], found.cells)
         return mesh._replace(cells=cells), found.sets
+
+    def _check_cells(self) -> None:
+        """Refuse cells that are folded or have no volume."""
+        mesh = self._mesh_and_sets()[0]
+        library = felupe()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of negative volumes, which are refused here
+            region = getattr(library, mesh.kind.region)(library.Mesh(mesh.points, mesh.cells, mesh.kind.meshio))
+        folded = np.flatnonzero(~(region.dV > 0).all(axis=0))
+        if len(folded):
+            corner = ", ".join(f"{value:.4g}" for value in mesh.vectors(mesh.points[mesh.cells[folded[0], :1]])[0])
+            raise InputError(
+                f"the mesh '{self.file}' has cells that are folded or have no volume ({len(folded)} of "
+                f"{len(mesh.cells)}, the first at x, y, z = {corner}): mend them in the program that made the mesh."
+            )
 
     def _check_sets(self) -> None:
         """Refuse sets, and directions in which they are held, that there are not."""

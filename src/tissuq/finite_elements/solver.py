@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.errors import InputError, ModelError
+from tissuq.errors import ModelError
 from tissuq.finite_elements.case import AXIAL, Case
+from tissuq.finite_elements.library import felupe
 from tissuq.finite_elements.loads import Action, load_on
 from tissuq.finite_elements.material import FElupeMaterial, distortional_energy
 from tissuq.mechanics import Material
 
-__all__ = ["CellFields", "Solver", "StrainPath", "felupe"]
+__all__ = ["CellFields", "Solver", "StrainPath"]
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, FloatArray, FloatArray]
@@ -315,20 +316,3 @@ def _stiffness(material: Material, modulus: float) -> float:
             "positive one."
         )
     return modulus
-
-
-def felupe() -> Any:
-    """Return FElupe, imported when it is first needed.
-
-    Raises
-    ------
-    InputError
-        When it is not installed.
-    """
-    try:
-        import felupe as library
-    except ImportError as error:
-        raise InputError(
-            "finite elements need FElupe: install tissuq with its extra 'fe' (pip install 'tissuq[fe]')."
-        ) from error
-    return library

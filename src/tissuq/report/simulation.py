@@ -39,6 +39,8 @@ __all__ = ["readable_forces", "simulation_result"]
 
 MUCH_BEYOND = 0.2
 """Share of the strain energy beyond the measurements from which these are to be extended."""
+SIZES = {"distance": "travel, or pressure", "press": "set that is pressed"}
+"""What sizes of cases are called, where that is not their name."""
 CELL_FIELDS = {
     "first_invariant": "I1 - 3",
     "second_invariant": "I2 - 3",
@@ -294,7 +296,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         fields = Picture(
             "fields", lambda: figures()["fields"], "Deformed section with mean and standard deviation of the largest "
             "stretch",
-            "A section through the axis, deformed by the mean displacement at the last step. fields.vtu and "
+            f"{case.mesh().section_is}, deformed by the mean displacement at the last step. fields.vtu and "
             "middle_draw.pvd hold the fields for ParaView.",
         )  # fmt: skip
         sections.append(Section("Where the body is strained", (fields,)))
@@ -327,7 +329,9 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         f"{simulation.seconds:.0f} s of one processor.",
     )
     sizes = [
-        [name.replace("_", " "), _size(name, value, case.travel_unit)] for name, value in vars(case).items() if value
+        [SIZES.get(name, name).replace("_", " "), _size(name, value, case.travel_unit)]
+        for name, value in vars(case).items()
+        if value
     ]
     return (*sections, Section("How it was computed", (computed, Table(["size", "value"], sizes))))
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from tissuq.errors import ConvergenceError, ModelError
+from tissuq.finite_elements.library import felupe
 from tissuq.finite_elements.response import Solve, solved
 from tissuq.finite_elements.simulation import Simulation, simulate
-from tissuq.finite_elements.solver import felupe
 from tissuq.finite_elements.warnings import simulation_warnings
 from tissuq.mechanics import Material
 from tissuq.model.discrepancy import NoDiscrepancy
