@@ -39,8 +39,6 @@ __all__ = ["readable_forces", "simulation_result"]
 
 MUCH_BEYOND = 0.2
 """Share of the strain energy beyond the measurements from which these are to be extended."""
-SIZES = {"distance": "travel, or pressure", "press": "set that is pressed"}
-"""What sizes of cases are called, where that is not their name."""
 CELL_FIELDS = {
     "first_invariant": "I1 - 3",
     "second_invariant": "I2 - 3",
@@ -328,8 +326,9 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         "Numbers after ± are bootstrap standard errors from the number of draws. "
         f"{simulation.seconds:.0f} s of one processor.",
     )
+    names = {"distance": case.travel_name, "press": "set that is pressed"}
     sizes = [
-        [SIZES.get(name, name).replace("_", " "), _size(name, value, case.travel_unit)]
+        [names.get(name, name).replace("_", " "), _size(name, value, case.travel_unit)]
         for name, value in vars(case).items()
         if value
     ]
