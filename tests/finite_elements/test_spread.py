@@ -86,9 +86,20 @@ def test_independent_sources_are_taken_out_of_parameters_and_discrepancy():
         assert getattr(found, name)[0] == pytest.approx(variance / total, abs=0.012), name
     names = "parameters", "discrepancy", "extrapolation", "test_scale", "noise"
     assert sum(getattr(found, name)[0] for name in names) == pytest.approx(1.0, rel=1e-12)
-    few = shares_of(complete[:14], complete[:14], 0.0, {name: values[:14] for name, values in sources.items()})
+    few = shares_of(complete[:19], complete[:19], 0.0, {name: values[:19] for name, values in sources.items()})
     assert np.isnan(few.extrapolation).all()
     assert few.parameters[0] == pytest.approx(1.0)
+
+
+def test_what_grows_as_an_exponential_of_the_score_is_due_to_it():
+    """Q = A exp(z): Var E[Q | z] = E[A]^2 Var exp(z), of which straight line and square leave a tenth unexplained."""
+    generator = np.random.default_rng(9)
+    score, size = generator.standard_normal((20000, 1)), 1 + 0.1 * generator.standard_normal((20000, 1))
+    force = size * np.exp(score)
+    found = shares_of(force, force, 0.0, {"extrapolation": np.hstack([score, score**2 - 1])})
+    variance = np.exp(1) * (np.exp(1) - 1)
+    assert found.extrapolation[0] == pytest.approx(variance / (variance + 0.01 * np.exp(2)), abs=0.01)
+    assert found.parameters[0] + found.extrapolation[0] == pytest.approx(1, rel=1e-9)
 
 
 def test_draws_of_a_posterior_tell_how_they_go_on_and_what_their_tests_share(posterior):
@@ -102,5 +113,5 @@ def test_draws_of_a_posterior_tell_how_they_go_on_and_what_their_tests_share(pos
     at_both = (1 + share * (high - 1) for share in (0.9, 1.5))
     within, beyond = (ensemble.stress(loading_mode("planar"), np.array([at])) for at in at_both)
     shares = [shares_of(stress, stress, 0.0, ensemble.sources).extrapolation[0] for stress in (within, beyond)]
-    assert shares[0] < 0.08
+    assert shares[0] < 0.1
     assert 0.8 < shares[1] <= 1

@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 PROBABILITY = 0.95
 MIN_DRAWS_A_COLUMN = 5
 """Draws for every column of a source, below which its part cannot be told."""
+MAX_EXPONENT = 300.0
+"""Of an exponential of a source, so that it stays finite."""
 BOOTSTRAP_RESAMPLES = 400
 """Number of bootstrap resamples of the draws for standard errors."""
 
@@ -55,7 +57,7 @@ class Shares:
     With Q a draw's quantity and Q0 that of its parameters alone, Var Q = Cov(Q, Q0) + Cov(Q, Q - Q0): the parameters'
     part and the discrepancy's. A negative one means that the two compensate each other in the posterior. What draws
     differ by independently of both, `Ensemble.sources`, is taken out of these first: its part is what of Q is linear in
-    its columns, by least squares.
+    its columns, and for the extrapolation in the exponential that follows from these, by least squares.
 
     Attributes
     ----------
@@ -124,16 +126,45 @@ def parts_of(
     parts = {"Q0": material_only, "rest": complete - material_only}
     remaining = {"parameters": material_only - material_only.mean(axis=0)}
     remaining["discrepancy"] = complete - complete.mean(axis=0) - remaining["parameters"]
-    columns = np.concatenate([np.zeros((len(complete), 0)), *sources.values()], axis=1)
-    if columns.size and len(complete) >= MIN_DRAWS_A_COLUMN * columns.shape[1]:
-        columns = columns - columns.mean(axis=0)
-        for name, part in remaining.items():
-            remaining[name] = part - columns @ np.linalg.lstsq(columns, part, rcond=None)[0]
-        weights = np.linalg.lstsq(columns, complete - complete.mean(axis=0), rcond=None)[0]
-        ends = np.cumsum([0, *(values.shape[1] for values in sources.values())])
-        for name, start, end in zip(sources, ends, ends[1:], strict=False):
-            parts[name] = columns[:, start:end] @ weights[start:end]
-    return parts | remaining
+    if not sources or len(complete) < MIN_DRAWS_A_COLUMN * _count(sources):
+        return parts | remaining
+    columns = zip(complete.T, remaining["parameters"].T, remaining["discrepancy"].T, strict=True)
+    of_steps = [_explained(sources, *values) for values in columns]
+    return parts | {name: np.stack([of_step[name] for of_step in of_steps], axis=1) for name in of_steps[0]}
+
+
+def _count(sources: Mapping[str, FloatArray]) -> int:
+    """Return the number of columns of a regression on sources, with the exponential of those with several."""
+    return sum(columns.shape[1] + (columns.shape[1] > 1) for columns in sources.values())
+
+
+def _explained(
+    sources: Mapping[str, FloatArray], values: FloatArray, parameters: FloatArray, discrepancy: FloatArray
+) -> dict[str, FloatArray]:
+    """Return what of values (N,) the sources explain, and what they leave of parameters and discrepancy (N,).
+
+    Beyond the data stresses go on as exponentials of the score: where all values have one sign, a source with several
+    columns gets the exponential of its part in the logarithm of the values as a further one.
+    """
+    designs = {name: columns - columns.mean(axis=0) for name, columns in sources.items()}
+    if np.abs(np.sign(values).sum()) == len(values):
+        joint, logs = np.hstack(list(designs.values())), np.log(np.abs(values))
+        weights = np.linalg.lstsq(joint, logs - logs.mean(), rcond=None)[0]
+        for name, columns in designs.items():
+            of_source, weights = weights[: columns.shape[1]], weights[columns.shape[1] :]
+            if columns.shape[1] > 1:
+                growth = np.exp(np.minimum(columns @ of_source, MAX_EXPONENT))
+                designs[name] = np.column_stack([columns, growth - growth.mean()])
+    joint = np.hstack(list(designs.values()))
+    fitted = {
+        name: np.linalg.lstsq(joint, part - part.mean(), rcond=None)[0]
+        for name, part in (("", values), ("parameters", parameters), ("discrepancy", discrepancy))
+    }
+    ends = np.cumsum([0, *(columns.shape[1] for columns in designs.values())])
+    spans = zip(designs, ends, ends[1:], strict=False)
+    explained = {name: joint[:, start:end] @ fitted[""][start:end] for name, start, end in spans}
+    left = {"parameters": parameters - joint @ fitted["parameters"]}
+    return explained | left | {"discrepancy": discrepancy - joint @ fitted["discrepancy"]}
 
 
 def _shares(complete: FloatArray, parts: Mapping[str, FloatArray], noise_sd: float) -> Shares:
