@@ -175,7 +175,7 @@ class BodyFromFile(Case):
     ...     path, {"ymin": "y", "xmin": "x"}, move="ymax", axis="y", distance=-0.1, shape="axisymmetric"
     ... )
     >>> tq.finite_elements.respond(disc, tq.materials()["neo-hookean"](), [0.0005], steps=1).force.round(5).tolist()
-    [0.00438]
+    [0.0042]
     """
 
     name: ClassVar[str] = "mesh"
