@@ -343,6 +343,11 @@ class LSDyna(FECode):
         ),
     )
     projections = PolynomialFit(LS_DYNA_TERMS), OgdenFit(LS_DYNA_OGDEN_TERMS)
+    # PyDyna's class mat_295 lists the fields of every card, and for their formulas points to remarks of the manual.
+    fibres = (
+        "the sources used here give the fields of its *MAT_295, but neither its energies nor whether compressed fibres "
+        "bear no load"
+    )
 
     def text(self, card: Card) -> str:
         constants: list[tuple[str, Any]] = list(card.constants.items())
