@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, Inflation, Mesh, RigidTip, Supports
+from tissuq.finite_elements.library import felupe, field_on, region_of
 
 __all__ = ["Action", "Contact", "Load", "Pressure", "load_on"]
 
@@ -119,23 +120,16 @@ class Pressure(Load):
     """
 
     def __init__(self, inflation: Inflation, mesh: Mesh, modulus: float) -> None:
-        import felupe
-
-        kind = getattr(felupe, f"{mesh.kind.region}Boundary")
-        cells = felupe.Mesh(mesh.points, mesh.cells, mesh.kind.meshio)
         try:
-            region = kind(cells, mask=inflation.points, ensure_3d=not mesh.is_solid)
+            region = region_of(mesh, "Boundary", mask=inflation.points, ensure_3d=not mesh.is_solid)
             empty = not len(region.mesh.cells)
         except (ValueError, IndexError):  # FElupe's region of no face
             empty = True
         if empty:
             raise InputError("no face of the surface has all of its points in the set that is under pressure.")
-        if mesh.is_solid:
-            field = felupe.Field(region, dim=3)
-        else:
-            field = (felupe.FieldPlaneStrain if mesh.is_plane else felupe.FieldAxisymmetric)(region, dim=2)
-        self._field, self._inflation, self._unit = felupe.FieldContainer([field]), inflation, MPA_OF_KPA / modulus
-        self._body = felupe.SolidBodyPressure(self._field)
+        self._inflation, self._unit = inflation, MPA_OF_KPA / modulus
+        self._field = felupe().FieldContainer([field_on(region, mesh)])
+        self._body = felupe().SolidBodyPressure(self._field)
 
     def at(self, u: FloatArray, travel: float) -> Action:
         self._field[0].values[:] = u

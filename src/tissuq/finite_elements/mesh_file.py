@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, CELL_KINDS, Case, FloatArray, Mesh, RigidTip, Supports
-from tissuq.finite_elements.library import felupe
+from tissuq.finite_elements.library import region_of
 
 __all__ = ["BodyFromFile", "MeshFile", "read_mesh"]
 
@@ -287,10 +287,9 @@ class BodyFromFile(Case):
     def _check_cells(self) -> None:
         """Refuse cells that are folded or have no volume."""
         mesh = self._mesh_and_sets()[0]
-        library = felupe()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of negative volumes, which are refused here
-            region = getattr(library, mesh.kind.region)(library.Mesh(mesh.points, mesh.cells, mesh.kind.meshio))
+            region = region_of(mesh)
         folded = np.flatnonzero(~(region.dV > 0).all(axis=0))
         if len(folded):
             corner = ", ".join(f"{value:.4g}" for value in mesh.vectors(mesh.points[mesh.cells[folded[0], :1]])[0])

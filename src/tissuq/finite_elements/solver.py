@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
 from tissuq.finite_elements.case import AXIAL, Case
-from tissuq.finite_elements.library import felupe
+from tissuq.finite_elements.library import felupe, field_on, region_of
 from tissuq.finite_elements.loads import Action, load_on
 from tissuq.finite_elements.material import FElupeMaterial, distortional_energy
 from tissuq.mechanics import Material
@@ -95,12 +95,9 @@ class Solver:
         energy = distortional_energy(material, values)  # which refuses fibres: a case has no directions for them
         self._umat = FElupeMaterial(material, values=values)
         self._modulus = self._umat.unit = _stiffness(material, energy.initial_shear_modulus)
-        region = getattr(fem, mesh.kind.region)(fem.Mesh(mesh.points, mesh.cells, mesh.kind.meshio))
-        if mesh.is_solid or mesh.is_plane:
-            field, width = fem.Field(region, dim=3) if mesh.is_solid else fem.FieldPlaneStrain(region, dim=2), 1.0
-        else:
-            field = fem.FieldAxisymmetric(region, dim=2)
-            width = 2 * np.pi * field.radius
+        region = region_of(mesh)
+        field = field_on(region, mesh)
+        width = 1.0 if mesh.is_solid or mesh.is_plane else 2 * np.pi * field.radius
         self._field = fem.FieldContainer([field])
         self._solid = fem.SolidBodyNearlyIncompressible(self._umat, self._field, bulk=bulk_ratio)
         self._volumes, self._parts = supports.parts * width * region.dV, supports.parts
