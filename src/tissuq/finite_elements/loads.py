@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,8 +32,8 @@ class Action:
     ----------
     residual : (d n,) array
         The forces against it, the derivative of its energy by the displacements.
-    stiffness : (d n, d n) sparse array
-        Their derivative.
+    stiffness : callable
+        Gives their derivative, a sparse (d n, d n) array, which is not needed wherever the forces are.
     residual_rate : (d n,) array
         Their derivative by the travel.
     response : float
@@ -39,7 +41,7 @@ class Action:
     """
 
     residual: FloatArray
-    stiffness: Any
+    stiffness: Callable[[], Any]
     residual_rate: FloatArray
     response: float
 
@@ -76,8 +78,6 @@ class Contact(Load):
         return cls(tip, mesh.points, direction, np.where(tip.points, stiffness, 0.0))
 
     def at(self, u: FloatArray, travel: float) -> Action:
-        from scipy.sparse import bsr_array
-
         count, dimensions = u.shape
         axis = np.zeros(dimensions)
         axis[AXIAL] = self.direction
@@ -94,10 +94,9 @@ class Contact(Load):
         squares = normal[:, :, None] * normal[:, None, :]
         across = (push * curvature)[:, None, None] * (np.eye(dimensions) - squares)
         blocks = pressed[:, None, None] * squares - across
-        stiffness = bsr_array((blocks, np.arange(count), np.arange(count + 1)), shape=2 * (dimensions * count,))
         return Action(
             -(push[:, None] * normal).ravel(),
-            stiffness.tocsr(),
+            partial(_block_diagonal, blocks),
             -(blocks @ axis).ravel(),
             float(push @ (normal @ axis)),
         )
@@ -134,9 +133,20 @@ class Pressure(Load):
     def at(self, u: FloatArray, travel: float) -> Action:
         self._field[0].values[:] = u
         rate = -self._body.assemble.vector(self._field, pressure=1.0).toarray().ravel() * self._unit
-        stiffness = -travel * self._unit * self._body.assemble.matrix(self._field, pressure=1.0)
         response = float(u[self._inflation.watched, self._inflation.column].mean())
-        return Action(travel * rate, stiffness.tocsr(), rate, response)
+        return Action(travel * rate, partial(self._stiffness, u, travel), rate, response)
+
+    def _stiffness(self, u: FloatArray, travel: float) -> Any:
+        self._field[0].values[:] = u
+        return (-travel * self._unit * self._body.assemble.matrix(self._field, pressure=1.0)).tocsr()
+
+
+def _block_diagonal(blocks: FloatArray) -> Any:
+    """Return a sparse array with blocks (n, d, d) on its diagonal."""
+    from scipy.sparse import bsr_array
+
+    count, size = blocks.shape[:2]
+    return bsr_array((blocks, np.arange(count), np.arange(count + 1)), shape=2 * (size * count,)).tocsr()
 
 
 def load_on(mesh: Mesh, supports: Supports, volumes: FloatArray, modulus: float) -> Load | None:

@@ -281,7 +281,7 @@ class Solver:
     def _tangent(self, action: Action | None) -> Any:
         """Return the rows of the stiffness matrix of what is free."""
         stiffness = self._solid.assemble.matrix().tocsr()
-        return (stiffness if action is None else stiffness + action.stiffness)[self._free]
+        return (stiffness if action is None else stiffness + action.stiffness())[self._free]
 
     def _residual(self, u: FloatArray, travel: float) -> FloatArray:
         """Return the forces of displacements (n, d) at a travel, (d n,), in initial shear moduli times mm^2."""
