@@ -50,6 +50,19 @@ def test_what_a_bound_cuts_counts_in_the_marginal_though_it_weighs_little(share)
     assert found.quantile(share / 2) < 500 < found.quantile(1.5 * share)
 
 
+def test_components_that_stand_for_several_mixtures_are_those_of_all_of_them():
+    generator = np.random.default_rng(2)
+    mixtures = [
+        GaussianMixture(
+            generator.random(count), generator.random((count, 1)), generator.random((count, p)), np.ones((count, p, p))
+        )
+        for count, p in ((5, 1), (400, 2), (30, 1))
+    ]
+    few, picked = GaussianMixture.of_all(mixtures, 50), GaussianMixture.of_all(mixtures).resampled(50)
+    for name in ("weights", "settings", "mean", "root"):
+        np.testing.assert_array_equal(getattr(few, name), getattr(picked, name))
+
+
 def test_the_mass_far_in_the_tail_keeps_its_digits():
     box = boxes([0.0], [np.inf])
     for distance in (5.0, 15.0, 30.0):

@@ -87,3 +87,16 @@ def test_places_that_have_converged_stay_while_others_do_not(monkeypatch):
     quantiles = Mixtures(weights, means, sds**2).quantile(0.25)
     assert len(evaluated) < 15  # by halving an interval of many sds to 1e-9, more than thirty
     np.testing.assert_allclose(weights @ ndtr((quantiles - means) / sds), 0.25, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("probability", [0.025, 0.5, 0.975])
+def test_a_quantile_of_very_many_gaussians_is_where_their_distribution_reaches_it(probability):
+    generator = np.random.default_rng(5)
+    units = np.array([0.01, 1.0, 50.0, 1.0])
+    means, sds = (
+        np.clip(generator.standard_t(2, (3000, 4)), -90, 90) * units,
+        generator.uniform(1, 2, (3000, 4)) * units,
+    )
+    weights = generator.dirichlet(np.ones(3000))
+    quantiles = Mixtures(weights, means, sds**2).quantile(probability)
+    np.testing.assert_allclose(weights @ norm.cdf((quantiles - means) / sds), probability, rtol=0, atol=1e-9)

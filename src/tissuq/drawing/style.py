@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
@@ -88,19 +88,27 @@ def new_figure(width: float, height: float, style: dict[Any, Any] = STYLE) -> It
 def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write a figure as SVG and PNG, the same bytes for the same figure."""
     from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
+    # Canvases draw once, where `Figure.savefig` draws twice; Matplotlib gives these functions no types.
+    write_svg: Callable[..., None] = FigureCanvasSVG(figure).print_svg
     with rc_context(STYLE):
-        figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+        write_svg(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
         figure.set_layout_engine("none")  # the layout of the first file is that of the second
-        figure.savefig(folder / f"{name}.png", dpi=150, metadata={"Software": None})
+        figure.dpi = 150
+        write_png: Callable[..., None] = FigureCanvasAgg(figure).print_png
+        write_png(folder / f"{name}.png", metadata={"Software": None})
 
 
 def inline_svg(figure: Figure, words: str) -> str:
     """Return a figure as SVG for a page of HTML, with words for those who cannot see it; its letters are text."""
     from matplotlib import rc_context
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     written = StringIO()
     with rc_context(STYLE | {"svg.fonttype": "none"}):
-        figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None})
+        write: Callable[..., None] = FigureCanvasSVG(figure).print_svg
+        write(written, metadata={"Date": None, "Creator": None})
     text = written.getvalue()
     return text[text.index("<svg") :].replace("<svg ", f'<svg role="img" aria-label="{words}" ', 1)

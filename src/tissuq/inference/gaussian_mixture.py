@@ -62,23 +62,31 @@ class GaussianMixture:
         return cls(weights, np.zeros((len(weights), 0)), mean, root)
 
     @classmethod
-    def of_all(cls, mixtures: Sequence[GaussianMixture]) -> GaussianMixture:
-        """Return the components of several mixtures; their weights together must sum to one.
+    def of_all(cls, mixtures: Sequence[GaussianMixture], count: int | None = None) -> GaussianMixture:
+        """Return the components of several mixtures, or at most ``count`` equally weighted ones that stand for all.
 
         Where they have different numbers of linear parameters, those that are missing are zero.
         """
+        weights = np.concatenate([mixture.weights for mixture in mixtures])
+        if count is not None and len(weights) > count:
+            representatives, ends = systematic(weights[None], count)[0], np.cumsum([len(m) for m in mixtures])
+            parts = np.split(representatives, np.searchsorted(representatives, ends[:-1]))
+            mixtures = [mixtures[i][part - ends[i] + len(mixtures[i])] for i, part in enumerate(parts)]
+            weights = np.full(count, weights.sum() / count)
         p, r = (max(mixture.root.shape[axis] for mixture in mixtures) for axis in (1, 2))
-        mean = [np.pad(mixture.mean, [(0, 0), (0, p - mixture.mean.shape[1])]) for mixture in mixtures]
-        root = [
-            np.pad(mixture.root, [(0, 0), (0, p - mixture.root.shape[1]), (0, r - mixture.root.shape[2])])
-            for mixture in mixtures
-        ]
+        mean, root = np.zeros((len(weights), p)), np.zeros((len(weights), p, r))
+        start = 0
+        for mixture in mixtures:
+            size, parameters, scores = mixture.root.shape
+            mean[start : start + size, :parameters] = mixture.mean
+            root[start : start + size, :parameters, :scores] = mixture.root
+            start += size
         members = [mixture.member for mixture in mixtures if mixture.member is not None]
         return cls(
-            np.concatenate([mixture.weights for mixture in mixtures]),
+            weights,
             np.concatenate([mixture.settings for mixture in mixtures]),
-            np.concatenate(mean),
-            np.concatenate(root),
+            mean,
+            root,
             np.concatenate(members) if len(members) == len(mixtures) else None,
         )
 
@@ -125,12 +133,12 @@ class GaussianMixture:
         resampling in their order, which keeps neighbours apart, picks equally weighted ones.
         """
         order = np.argsort(self.weights)
-        heavy = self[np.sort(order[np.cumsum(self.weights[order]) > NEGLIGIBLE_WEIGHT * self.weights.sum()])]
-        total = heavy.weights.sum()
-        if len(heavy.weights) <= count:
-            return heavy.weighted(heavy.weights / total)
-        picked = heavy.resampled(count)
-        return picked.weighted(picked.weights / total)
+        heavy = np.sort(order[np.cumsum(self.weights[order]) > NEGLIGIBLE_WEIGHT * self.weights.sum()])
+        weights = self.weights[heavy] / self.weights[heavy].sum()
+        if len(heavy) <= count:
+            return self[heavy].weighted(weights)
+        picked = self[heavy[systematic(weights[None], count)[0]]]
+        return picked.weighted(np.full(count, 1 / count))
 
     def resampled(self, count: int) -> GaussianMixture:
         """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -96,13 +96,10 @@ class TruncatedMixture:
         """The components that bounds of several parameters cut."""
         return self.gaussians[self.touched.sum(axis=1) > 1]
 
-    def components(self) -> GaussianMixture:
-        """Return all as one mixture: Gaussians, and draws within the bounds from what these cut."""
-        mixture = self.free
-        for gaussians in (*self.cut.values(), self.crossed):
-            if len(gaussians):
-                mixture = GaussianMixture.of_all([mixture, self._drawn(gaussians)])
-        return mixture
+    def components(self, count: int | None = None) -> GaussianMixture:
+        """Return all, or at most so many that stand for all: Gaussians, and draws in the bounds from what these cut."""
+        are_cut = [self._drawn(gaussians) for gaussians in (*self.cut.values(), self.crossed) if len(gaussians)]
+        return GaussianMixture.of_all([self.free, *are_cut], count)
 
     def marginal(self, index: int) -> Marginal:
         """Return the marginal of one linear parameter: in closed form where at most one bound cuts."""
@@ -161,7 +158,8 @@ def _of_points(gaussians: GaussianMixture, shares: FloatArray, points: FloatArra
     """Return components without extent: points (M, R, p) that have shares (M, R) of the weights of M Gaussians."""
     weights = (gaussians.weights[:, None] * shares).ravel()
     rows, p = np.repeat(np.arange(len(points)), points.shape[1]), points.shape[2]
-    return replace(gaussians[rows], weights=weights, mean=points.reshape(-1, p), root=np.zeros((len(rows), p, p)))
+    member = None if gaussians.member is None else gaussians.member[rows]
+    return GaussianMixture.of_points(weights, gaussians.settings[rows], points.reshape(-1, p), member)
 
 
 def _marginal_of_cut(gaussians: GaussianMixture, index: int, cut_index: int, ends: tuple[float, float]) -> Marginal:

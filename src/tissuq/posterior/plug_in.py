@@ -118,7 +118,8 @@ class ErrorEstimates:
 
         Only beside an energy discrepancy: without one, what looks like correlated errors is that of the material.
         Compared are few energies, each noise at the level that suits it best. A longer correlation than a share of the
-        curve is not tried: such errors are the smooth ones of the test.
+        curve is not tried: such errors are the smooth ones of the test. The log evidence is concave, nearly, in the
+        coordinate in which the lags are evenly spaced: it ends where the gain can no longer be reached.
         """
         fewest = min(map(len, model.experiment.curves))
         is_open = type(model.noise) is UnknownNoise and bool(model.energy_symbols) and self._sums_noise(model)
@@ -131,8 +132,10 @@ class ErrorEstimates:
         level, solve = model.fitted_errors.level or model.noise_of_tests[1], self._similar_solver()
         for lag in np.tanh(lags):
             level, evidence = self._best_level(autoregressive.with_errors(lag=float(lag)), level, solve)
+            step = evidence - evidences[-1] if evidences else np.inf
             evidences.append(evidence)
-            if evidence < max(evidences) - MIN_LOG_EVIDENCE_GAIN:
+            at_most = evidence + (LAG_COUNT - len(evidences)) * (step + 2 * LEVEL_ACCURACY)
+            if step < 0 or at_most < evidences[0] + MIN_LOG_EVIDENCE_GAIN:
                 break
         fits = model.fitted_errors.fits + self._fits
         if max(evidences) < evidences[0] + MIN_LOG_EVIDENCE_GAIN:

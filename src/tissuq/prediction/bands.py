@@ -45,6 +45,8 @@ MAX_PAIRS, MIN_COMPONENTS = 5_000_000, 200
 """Number of pairs of Gaussians, over all points, of a score; number to which a mixture is thinned at the most."""
 SMOOTHING = 0.01
 """Standard deviation of a Gaussian in a quantile, at the least, over its mean or the spread of all."""
+COMPONENTS_OF_SKETCH = 300
+"""Gaussians that stand for a mixture where the search for its quantiles begins."""
 MAX_STANDARD_SCORE = 30.0
 """Standard scores beyond which the tail of a Gaussian is nothing."""
 
@@ -80,12 +82,21 @@ class Mixtures:
         sd = np.sqrt(np.maximum(self.variances, smoothing**2))
         sd = np.maximum(sd, 1e-300)
         low, high = (mean - 10 * sd).min(axis=0), (mean + 10 * sd).max(axis=0)
-        value = np.clip(centre + ndtri(probability) * spread, low, high)
+        begin = centre + ndtri(probability) * spread
+        if len(self.weights) > 2 * COMPONENTS_OF_SKETCH:
+            begin = self._thinned(COMPONENTS_OF_SKETCH).quantile(probability)
+        value = quantile = np.clip(begin, low, high)
+        places = np.arange(len(value))
         for _ in range(60):
             scores = (value - mean) / sd
             excess = self.weights @ ndtr(scores) - probability
-            if np.abs(excess).max() < 1e-9:
+            quantile[places] = value
+            is_open = np.abs(excess) >= 1e-9
+            if not is_open.any():
                 break
+            if not is_open.all():
+                places, value, low, high, excess = (a[is_open] for a in (places, value, low, high, excess))
+                mean, sd, scores = (a[:, is_open] for a in (mean, sd, scores))
             low, high = np.where(excess < 0, value, low), np.where(excess < 0, high, value)
             with np.errstate(over="ignore"):
                 density = self.weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
@@ -93,7 +104,7 @@ class Mixtures:
             value = np.where(
                 (step >= low) & (step <= high), step, 0.5 * (low + high)
             )  # at an end where it has converged
-        return np.where(spread == 0, centre, value)
+        return np.where(spread == 0, centre, quantile)
 
     def crps(self, values: FloatArray) -> FloatArray:
         """Return the continuous ranked probability score (g,) of a value at every place, in its unit; small is good.

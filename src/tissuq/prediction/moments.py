@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -336,10 +337,11 @@ def _energies(
     Beyond q the roots are zero. What the terms that serve the data leave of the discrepancy elsewhere is independent of
     the data.
     """
+    variance_of_block = cache(lambda block, reach, length: block.stress_variance(states, reach, length))
     for member, rows, features, weights in energy_terms(model, components, states):
         unexplained = [
-            np.maximum(total - (terms**2).sum(axis=1), 0.0)
-            for total, terms in zip(member.stress_variances(states), features, strict=True)
+            np.maximum(variance_of_block(*scaled_block) - (terms**2).sum(axis=1), 0.0)
+            for scaled_block, terms in zip(member.scaled_blocks, features, strict=True)
         ]
         symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.amplitude_indices]
         all_terms = side_by_side(features, len(states))
@@ -355,9 +357,10 @@ def energy_terms(
     """Yield energy discrepancies, whose they are, the stresses of their terms, and where the weights of these are."""
     start = len(model.linear)
     assert components.member is not None  # noqa: S101 (the caller has looked)
+    features_of_block = cache(lambda block, reach, length: block.stress_features(states, reach, length))
     for index in np.unique(components.member):
         member, rows = model.energy_members[index], np.flatnonzero(components.member == index)
-        features = member.stress_features(states)
+        features = [features_of_block(*scaled_block) for scaled_block in member.scaled_blocks]
         yield member, rows, features, slice(start, start + sum(terms.shape[1] for terms in features))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -91,7 +91,12 @@ class Stress:
         count, scores = len(self.components), self.components.root.shape[2]
         copies = -(-MIN_DRAWS // count)
         uniform = qmc.Sobol(scores + 1, rng=0).random_base2((count * copies - 1).bit_length())[: count * copies]
-        states = self.components[np.repeat(np.arange(count), copies)]
-        mean = states.mean + np.einsum("mpq,mq->mp", states.root, ndtri(uniform[:, 1:]))
+        weights, settings, mean = (
+            np.repeat(array, copies, axis=0)
+            for array in (self.components.weights / copies, self.components.settings, self.components.mean)
+        )
+        member = None if self.components.member is None else np.repeat(self.components.member, copies)
+        spread = self.components.root @ ndtri(uniform[:, 1:]).reshape(count, copies, scores).swapaxes(1, 2)
+        values = mean + spread.swapaxes(1, 2).reshape(mean.shape)
         probability = uniform[:, 0] if self.errs_beyond else np.full(len(uniform), 0.5)
-        return replace(states, mean=mean, weights=states.weights / copies), probability
+        return GaussianMixture.of_points(weights, settings, values, member), probability

@@ -261,8 +261,7 @@ class _EnergySums:
         mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
-        components = TruncatedMixture.of(mixture, box.beyond(mean, root), box).components()
-        return components if few is None else components.resampled(few)
+        return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components(few)
 
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:

@@ -20,6 +20,7 @@ __all__ = [
     "NEGLIGIBLE_SHARE",
     "Points",
     "Weighing",
+    "at_end",
     "linear_at",
     "log_prior_of_amplitude",
     "log_prior_of_noise",
@@ -125,14 +126,12 @@ class Weighing:
             ]
         points = Points.joined(points_of_members)
         mass = _masses([points])[0]
-        at_even, last, counts = (
-            np.ones(len(mass)),
-            0.0,
-            np.array([lattice.misfit.shape[:2] for lattice in self._lattices]),
-        )
-        for count, indices in zip(counts[points.lattice].T, (points.second_index, points.first_index), strict=True):
+        at_even = np.ones(len(mass))
+        for count, indices in zip(
+            _counts(self._lattices, points), (points.second_index, points.first_index), strict=True
+        ):
             at_even *= np.where(count == 1, 1.0, 2.0 * (indices % 2 == 0))
-            last += mass[(count > 1) & (indices == count - 1)].sum()
+        last = mass[at_end(self._lattices, points)].sum()
         coarse = at_even @ mass
         error = np.inf if last > MAX_LAST_SHARE * mass.sum() else float(abs(coarse / mass.sum() - 1) ** 1.5)
         return points[mass >= _least_that_matters(mass)], error
@@ -257,6 +256,17 @@ class Weighing:
         return Points(
             member_of_point, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside
         )
+
+
+def _counts(lattices: Sequence[Lattice], points: Points) -> NDArray[np.intp]:
+    """Return how many ratios of the second block and of the first one (2, M) the lattices of points have."""
+    return np.array([lattice.misfit.shape[:2] for lattice in lattices])[points.lattice].T
+
+
+def at_end(lattices: Sequence[Lattice], points: Points) -> NDArray[np.bool_]:
+    """Return which points (M,) are at the largest amplitudes of their lattice: it is not known what lies beyond."""
+    counts, indices = _counts(lattices, points), np.stack([points.second_index, points.first_index])
+    return np.asarray(((counts > 1) & (indices == counts - 1)).any(axis=0))
 
 
 def linear_at(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[FloatArray, FloatArray]:

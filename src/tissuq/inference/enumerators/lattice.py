@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tissuq.inference.linear import integrated
 from tissuq.model.discrepancy import Member, side_by_side
 
-__all__ = ["LOG_RATIO_STEP", "Directions", "Lattice", "Reduced", "Rows"]
+__all__ = ["LOG_RATIO_STEP", "MAX_STRESS_RATIO", "Directions", "Lattice", "Reduced", "Rows"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -137,6 +137,8 @@ class Directions:
         For each block, a ratio g = c / noise_sd below which it is not likely to be before the data.
     step, shift : float
         Of log g: between points of the lattice, and from where it would begin.
+    largest : float
+        Ratio of the discrepancy's stress (root mean square) to the noise at which the lattice ends.
 
     Attributes
     ----------
@@ -159,12 +161,13 @@ class Directions:
         unlikely: list[float],
         step: float = LOG_RATIO_STEP,
         shift: float = 0.0,
+        largest: float = MAX_STRESS_RATIO,
     ) -> None:
         self.member, self.step = member, step
         features = [block / scale[:, None] for block in features]
         sizes = (max(float(np.sqrt((block**2).sum() / count)), negligible_stress) for block in features)
         pairs = zip(sizes, unlikely, strict=True)
-        grids = [*(_grid(size, low, step, shift) for size, low in pairs), *[np.zeros(1)] * 2]
+        grids = [*(_grid(size, low, step, shift, largest) for size, low in pairs), *[np.zeros(1)] * 2]
         self.ratios = grids[0], grids[1]
         self.basis, triangle = np.linalg.qr(side_by_side(features, len(scale)))
         first_block, second_block = np.split(triangle, [features[0].shape[1] if features else 0], axis=1)
@@ -274,7 +277,7 @@ def _log_product(variance: FloatArray) -> FloatArray:
     return np.asarray(np.log(np.multiply.reduceat(variance, starts, axis=-1)).sum(axis=-1))
 
 
-def _grid(size: float, unlikely: float, step: float, shift: float) -> FloatArray:
+def _grid(size: float, unlikely: float, step: float, shift: float, largest: float) -> FloatArray:
     """Return the ratios of a block whose terms have a stress of some size (root mean square)."""
-    smallest, largest = min(MIN_STRESS_RATIO / size, unlikely) * np.exp(shift), MAX_STRESS_RATIO / size
-    return np.asarray(smallest * np.exp(step * np.arange(int(log(largest / smallest) / step) + 1)))
+    smallest, end = min(MIN_STRESS_RATIO / size, unlikely) * np.exp(shift), largest / size
+    return np.asarray(smallest * np.exp(step * np.arange(int(log(end / smallest) / step) + 1)))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.amplitudes import Points, Weighing, linear_at
-from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Directions, Lattice, Rows
+from tissuq.inference.enumerators.amplitudes import Points, Weighing, at_end, linear_at
+from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, MAX_STRESS_RATIO, Directions, Lattice, Rows
 from tissuq.inference.enumerators.line import FINE, Accuracy, Line, first_places, known_along, peaks
 from tissuq.inference.marginal import Marginal, marginal_of_table
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal, systematic
@@ -43,6 +43,8 @@ SCOUT_MEMBERS = 6
 """Members, about, whose posterior guides the search for the values."""
 GUIDED_DIVISOR = 8
 """So many times fewer values in a round, where it is known from a similar model about where they lie."""
+MAX_RATIO_TO_DATA = 3000.0
+"""Stress of the discrepancy over that of the data, beyond which there is mostly nothing."""
 NEGLIGIBLE_MEMBERS = 1e-3
 """Share of the posterior, in its middle, of all members that are left out."""
 GOLDEN_RATIO = 0.6180339887
@@ -180,14 +182,28 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     """Return the posteriors of models on the same stretches that have no outer parameters."""
     stresses = np.array([model.stress for model in models]).T
     rows = Rows(models[0].design, stresses, np.ones(len(stresses)), models[0].experiment.size)
-    terms = _Terms(models)
-    lattices = [Lattice(terms.directions(member, rows.scale), rows) for member in range(len(models[0].energy_members))]
+    terms, members = _Terms(models), range(len(models[0].energy_members))
+    for largest in _largest_ratios(models):
+        lattices = [Lattice(terms.directions(member, rows.scale, largest=largest), rows) for member in members]
+        sums = [Weighing(model, lattices, index).points() for index, model in enumerate(models)]
+        if not any(at_end(lattices, points).any() for points, _ in sums):
+            break
     nodes = []
-    for index, model in enumerate(models):
-        points, error = Weighing(model, lattices, index).points()
+    for index, (points, error) in enumerate(sums):
         points = _thinned(points, MAX_POINTS, 0.5)
         nodes.append(Node(points, *linear_at(lattices, index, points), error))
     return nodes
+
+
+def _largest_ratios(models: Sequence[StatisticalModel]) -> list[float]:
+    """Return ratios of the discrepancy's stress to the noise, ascending, up to which lattices are tried.
+
+    Where the noise is known, so is about the largest that the data allow: most posteriors end there.
+    """
+    if models[0].noise.parameters:
+        return [MAX_STRESS_RATIO]
+    of_data = max(float(np.sqrt((model.stress**2).mean())) / float(model.noise.sd({}, 0.0)) for model in models)
+    return [min(MAX_RATIO_TO_DATA * of_data, MAX_STRESS_RATIO), MAX_STRESS_RATIO]
 
 
 def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
@@ -313,7 +329,14 @@ class _Terms:
         self._count = models[0].experiment.size
         self._negligible_stress = float(np.sqrt((models[0].rows(unit) ** 2).sum() / self._count))
 
-    def directions(self, index: int, scale: FloatArray, step: float = LOG_RATIO_STEP, shift: float = 0.0) -> Directions:
+    def directions(
+        self,
+        index: int,
+        scale: FloatArray,
+        step: float = LOG_RATIO_STEP,
+        shift: float = 0.0,
+        largest: float = MAX_STRESS_RATIO,
+    ) -> Directions:
         """Return the directions of one member for the noise (n,) of every measurement over noise_sd."""
         member, features = self._members[index], self._features[index]
         symbols = [self._models[0].energy_symbols[block] for block in member.amplitude_indices]
@@ -324,7 +347,7 @@ class _Terms:
             )
             for symbol in symbols
         ]
-        return Directions(member, scale, features, self._count, self._negligible_stress, unlikely, step, shift)
+        return Directions(member, scale, features, self._count, self._negligible_stress, unlikely, step, shift, largest)
 
 
 class _Sums:

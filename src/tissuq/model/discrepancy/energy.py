@@ -103,10 +103,6 @@ class Member:
         """Return the engineering stresses (n, r) of each block's terms."""
         return [block.stress_features(states, reach, length) for block, reach, length in self.scaled_blocks]
 
-    def stress_variances(self, states: States) -> list[FloatArray]:
-        """Return the variance (n,) of the stress of each block at unit amplitude."""
-        return [block.stress_variance(states, reach, length) for block, reach, length in self.scaled_blocks]
-
     def slopes(self, coordinates: Coordinates) -> list[Coordinates]:
         """Return of each block the slopes of its terms, as `EnergyBlock.slopes`."""
         return [block.slopes(coordinates, reach, length) for block, reach, length in self.scaled_blocks]
