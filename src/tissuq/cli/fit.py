@@ -62,19 +62,21 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     if call.config and not names:
         is_comparison = setting_of(call.config, "laws") is not None
     chosen = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
-    own = {name: material_named(name, laws=True) for name in names if name != ALL}
+    laws_of_names = {name: material_named(name, laws=True) for name in names if name != ALL}
     kind = LawSettings if is_comparison else SpecimenSettings
     settings = call.loaded_as(kind, ("noise", "noise_sd"), **measured, **chosen)
     sources = [call.beside / test.file for test in settings.tests or (settings,)]
     if files and call.config:
         _check_same(files[0], sources[0], call.config)
     readings = settings.readings(call.beside, found)
-    priors_in_mpa(settings, settings.fitted_laws(own).values(), Experiment.of([of.experiment for of in readings]))
+    priors_in_mpa(
+        settings, settings.fitted_laws(laws_of_names).values(), Experiment.of([of.experiment for of in readings])
+    )
     target = call.target(Path("runs") / reading.run_name(paths, call.config, sources))
     if isinstance(settings, LawSettings):
-        _compare_laws(call, settings, own, readings, sources, target)
+        _compare_laws(call, settings, laws_of_names, readings, sources, target)
     else:
-        _fit_one(call, settings, next(iter(own.values()), None), readings, sources, target)
+        _fit_one(call, settings, next(iter(laws_of_names.values()), None), readings, sources, target)
 
 
 def _fit_one(

@@ -71,52 +71,52 @@ class AnsysResults(ResultFile):
         substeps = np.asarray(self.content._resultheader["ls_table"])[:, 1]
         times = self.content.time_values
         return [
-            place
-            for place, (time, substep) in enumerate(zip(times, substeps, strict=False))
+            number
+            for number, (time, substep) in enumerate(zip(times, substeps, strict=False))
             if substep != NOT_CONVERGED and time <= self.results.last_time * (1 + 1e-5)
         ]
 
     def field(self, kind: str) -> Values | None:
         if kind not in WRITTEN or not self.content.available_results[WRITTEN[kind][0]]:
             return None
-        places = [place for place in self._converged if self.content._solution_header(place)[WRITTEN[kind][1]]]
-        if not places:
+        numbers = [number for number in self._converged if self.content._solution_header(number)[WRITTEN[kind][1]]]
+        if not numbers:
             return None
         read = {"U": self._displacements, "RF": self._reactions, "S": self._stresses}[kind]
-        times = np.array([self.content.time_values[place] for place in places], dtype=np.float64)
+        times = np.array([self.content.time_values[number] for number in numbers], dtype=np.float64)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the libraries that the reader uses
-            return Values(times, np.array([read(place) for place in places]))
+            return Values(times, np.array([read(number) for number in numbers]))
 
     def of_set(self, kind: str, set_name: str, how: str) -> Values | None:
         """Return a field at the members of a set; of stresses, which are at corners alone, at those members."""
-        found = super().of_set(kind, set_name, how)
-        if found is None or kind != "S":
-            return found
-        is_corner = np.isfinite(found.values).all(axis=(0, 2))
-        return Values(found.times, found.values[:, is_corner if is_corner.any() else slice(None)])
+        values = super().of_set(kind, set_name, how)
+        if values is None or kind != "S":
+            return values
+        is_corner = np.isfinite(values.values).all(axis=(0, 2))
+        return Values(values.times, values.values[:, is_corner if is_corner.any() else slice(None)])
 
-    def _displacements(self, place: int) -> FloatArray:
-        numbers, values = self.content.nodal_displacement(place)
+    def _displacements(self, number: int) -> FloatArray:
+        numbers, values = self.content.nodal_displacement(number)
         in_space = np.zeros((len(values), 3))
         in_space[:, : min(3, values.shape[1])] = values[:, :3]
         return self._spread(numbers, in_space)
 
-    def _stresses(self, place: int) -> FloatArray:
-        numbers, values = self.content.nodal_stress(place)
+    def _stresses(self, number: int) -> FloatArray:
+        numbers, values = self.content.nodal_stress(number)
         return self._spread(numbers, values[:, AS_TENSOR])
 
-    def _reactions(self, place: int) -> FloatArray:
+    def _reactions(self, number: int) -> FloatArray:
         """Return the forces, which are zero where a node is free; moments and other degrees of freedom are left out."""
-        forces, numbers, freedoms = self.content.nodal_reaction_forces(place)
-        found = np.zeros((len(self.nodes), 3))
+        forces, numbers, freedoms = self.content.nodal_reaction_forces(number)
+        reactions = np.zeros((len(self.nodes), 3))
         is_force = np.isin(freedoms, (1, 2, 3))
         rows = np.searchsorted(self.nodes, numbers[is_force])
-        np.add.at(found, (rows, np.asarray(freedoms)[is_force] - 1), forces[is_force])
-        return found
+        np.add.at(reactions, (rows, np.asarray(freedoms)[is_force] - 1), forces[is_force])
+        return reactions
 
     def _spread(self, numbers: NDArray[Any], values: FloatArray) -> FloatArray:
         """Return values at all nodes, from those at some of them."""
-        found = np.full((len(self.nodes), values.shape[1]), np.nan)
-        found[np.searchsorted(self.nodes, numbers)] = values
-        return found
+        at_all_nodes = np.full((len(self.nodes), values.shape[1]), np.nan)
+        at_all_nodes[np.searchsorted(self.nodes, numbers)] = values
+        return at_all_nodes

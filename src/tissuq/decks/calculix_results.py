@@ -191,20 +191,20 @@ def _read(lines: list[bytes], last_time: float) -> Frd:
     elements: dict[int, list[tuple[list[int], int]]] = {}
     materials: dict[int, str] = {}
     fields: dict[str, list[tuple[float, dict[str, FloatArray]]]] = {}
-    at = 0
-    while at < len(lines):
-        line = lines[at]
+    row = 0
+    while row < len(lines):
+        line = lines[row]
         if line.startswith(b"    1UMAT"):
             materials[int(line[9:14])] = line[14:].strip().decode("utf-8", "replace")
         elif line.startswith(b"    2C"):
             count = int(line.split()[1])
-            nodes, points = _numbers(lines[at + 1 : at + 1 + count], 3)
-            at += count
+            nodes, points = _numbers(lines[row + 1 : row + 1 + count], 3)
+            row += count
         elif line.startswith(b"    3C"):
-            at = _read_elements(lines, at + 1, int(line.split()[1]), elements)
+            row = _read_elements(lines, row + 1, int(line.split()[1]), elements)
         elif line.startswith(b"  100C"):
-            at = _read_field(lines, at, last_time, nodes, fields)
-        at += 1
+            row = _read_field(lines, row, last_time, nodes, fields)
+        row += 1
     row_of = {int(node): index for index, node in enumerate(nodes)}
     cells = {}
     for kind, rows in elements.items():
@@ -222,43 +222,43 @@ def _numbers(lines: list[bytes], count: int) -> tuple[NDArray[np.int64], FloatAr
     return nodes, values
 
 
-def _read_elements(lines: list[bytes], at: int, count: int, elements: dict[int, list[tuple[list[int], int]]]) -> int:
+def _read_elements(lines: list[bytes], row: int, count: int, elements: dict[int, list[tuple[list[int], int]]]) -> int:
     for _ in range(count):
-        kind, material = int(lines[at][13:18]), int(lines[at][23:28])
+        kind, material = int(lines[row][13:18]), int(lines[row][23:28])
         wanted, members = CELL_TYPES[kind][1], list[int]()
         while len(members) < wanted:
-            at += 1
-            members += [int(lines[at][start : start + 10]) for start in range(3, len(lines[at].rstrip()), 10)]
+            row += 1
+            members += [int(lines[row][start : start + 10]) for start in range(3, len(lines[row].rstrip()), 10)]
         elements.setdefault(kind, []).append((members, material))
-        at += 1
-    return at - 1
+        row += 1
+    return row - 1
 
 
 def _read_field(
-    lines: list[bytes], at: int, last_time: float, nodes: NDArray[np.int64], fields: dict[str, list[Any]]
+    lines: list[bytes], row: int, last_time: float, nodes: NDArray[np.int64], fields: dict[str, list[Any]]
 ) -> int:
     """Read one field at one time; return where it ends. Components that are not stored (ALL) are passed over."""
-    time = float(lines[at][12:24])
-    at += 1
-    name = lines[at].split()[1].decode()
+    time = float(lines[row][12:24])
+    row += 1
+    name = lines[row].split()[1].decode()
     components = []
-    at += 1
-    while lines[at].startswith(b" -5"):
-        words = lines[at].split()
+    row += 1
+    while lines[row].startswith(b" -5"):
+        words = lines[row].split()
         if words[1] != b"ALL":
             components.append(words[1].decode())
-        at += 1
-    end = at
+        row += 1
+    end = row
     while not lines[end].startswith(b" -3"):
         end += 1
     if time <= last_time * (1 + 1e-5):
-        rows = [line for line in lines[at:end] if line.startswith(b" -1")]
+        rows = [line for line in lines[row:end] if line.startswith(b" -1")]
         numbers, values = _numbers(rows, min(len(components), 6))
         if not np.array_equal(numbers, nodes):
             order = {int(node): index for index, node in enumerate(numbers)}
-            whole = np.full((len(nodes), values.shape[1]), np.nan)
+            at_all_nodes = np.full((len(nodes), values.shape[1]), np.nan)
             present = [index for index, node in enumerate(nodes) if int(node) in order]
-            whole[present] = values[[order[int(nodes[index])] for index in present]]
-            values = whole
+            at_all_nodes[present] = values[[order[int(nodes[index])] for index in present]]
+            values = at_all_nodes
         fields.setdefault(name, []).append((time, dict(zip(components, values.T, strict=False))))
     return end

@@ -61,13 +61,13 @@ class Chunk(NamedTuple):
 
 def chunks(content: memoryview) -> Iterator[Chunk]:
     """Return the chunks that follow each other, up to one that is cut short."""
-    at = 0
-    while at + 8 <= len(content):
-        tag, size = struct.unpack_from("<II", content, at)
-        if at + 8 + size > len(content):
+    offset = 0
+    while offset + 8 <= len(content):
+        tag, size = struct.unpack_from("<II", content, offset)
+        if offset + 8 + size > len(content):
             return
-        yield Chunk(tag, content[at + 8 : at + 8 + size])
-        at += 8 + size
+        yield Chunk(tag, content[offset + 8 : offset + 8 + size])
+        offset += 8 + size
 
 
 def child(content: memoryview, *tags: int) -> memoryview:
@@ -79,21 +79,21 @@ def child(content: memoryview, *tags: int) -> memoryview:
 
 def _top(content: bytes) -> Iterator[Chunk]:
     """Return the chunks at the top, of which each may be a stream of zlib of its own."""
-    rest = memoryview(content)[4:]
-    while len(rest) >= 8:
-        if rest[0]:  # the tags at the top end in a zero, the first byte of a stream is 0x78
+    unread = memoryview(content)[4:]
+    while len(unread) >= 8:
+        if unread[0]:  # the tags at the top end in a zero, the first byte of a stream is 0x78
             stream = zlib.decompressobj()
-            unpacked = memoryview(stream.decompress(rest))
+            unpacked = memoryview(stream.decompress(unread))
             if not stream.eof:
                 return
             yield from chunks(unpacked)
-            rest = rest[len(rest) - len(stream.unused_data) :]
+            unread = unread[len(unread) - len(stream.unused_data) :]
             continue
-        chunk = next(chunks(rest), None)
+        chunk = next(chunks(unread), None)
         if chunk is None:
             return
         yield chunk
-        rest = rest[8 + len(chunk.content) :]
+        unread = unread[8 + len(chunk.content) :]
 
 
 @dataclass(frozen=True)
@@ -138,24 +138,24 @@ def read_plot_file(path: Path) -> PlotFile:
 def _read(content: bytes, name: str) -> PlotFile:
     if struct.unpack_from("<I", content)[0] != MAGIC:
         raise ValueError("no plot file")
-    found: PlotFile | None = None
+    plot: PlotFile | None = None
     variables: dict[str, tuple[int, int, int]] = {}
     for tag, inner in _top(content):
         if tag == ROOT:
             if _integers(child(inner, HEADER, VERSION))[0] < FIRST_VERSION:
                 raise ValueError("written by FEBio 2")
             variables = _variables(child(inner, DICTIONARY))
-        elif tag == MESH and found is not None:
+        elif tag == MESH and plot is not None:
             raise InputError(f"'{name}' has a mesh that changes during the run, of which sets and nodes are not known.")
         elif tag == MESH:
-            found = _mesh(inner, variables)
-        elif tag == STATE and found is not None:
+            plot = _mesh(inner, variables)
+        elif tag == STATE and plot is not None:
             head = child(inner, STATE_HEADER)
             if not any(_integers(child(head, STATUS))):
-                found.states.append((float(struct.unpack_from("<f", child(head, TIME))[0]), child(inner, STATE_DATA)))
-    if found is None:
+                plot.states.append((float(struct.unpack_from("<f", child(head, TIME))[0]), child(inner, STATE_DATA)))
+    if plot is None:
         raise ValueError("no mesh")
-    return found
+    return plot
 
 
 def _integers(content: memoryview) -> NDArray[np.int64]:
@@ -167,12 +167,12 @@ def _text(content: memoryview) -> str:
 
 
 def _variables(dictionary: memoryview) -> dict[str, tuple[int, int, int]]:
-    found = {}
+    variables = {}
     for section, data in ((NODAL, NODE_DATA), (DOMAIN_WISE, ELEMENT_DATA)):
         for number, (_, item) in enumerate(chunks(child(dictionary, section)), start=1):
             storage = int(_integers(child(item, ITEM_FORMAT))[0])
-            found[_text(child(item, ITEM_NAME))] = data, number, storage
-    return found
+            variables[_text(child(item, ITEM_NAME))] = data, number, storage
+    return variables
 
 
 def _mesh(mesh: memoryview, variables: Mapping[str, tuple[int, int, int]]) -> PlotFile:
@@ -219,28 +219,30 @@ class FEBioResults(ResultFile):
         return self.content.node_sets
 
     def field(self, kind: str) -> Values | None:
-        known = [name for name in FIELDS[kind] if name in self.content.variables]
-        if not known:
+        written_names = [name for name in FIELDS[kind] if name in self.content.variables]
+        if not written_names:
             return None
-        section, number, storage = self.content.variables[known[0]]
+        section, number, storage = self.content.variables[written_names[0]]
         times, rows = [], []
         for time, data in self.content.states:
             if time <= self.results.last_time * (1 + 1e-5):
-                parts = {tag: np.frombuffer(part, "<f4") for tag, part in chunks(_variable(data, section, number))}
-                if parts:
+                regions = {
+                    tag: np.frombuffer(values, "<f4") for tag, values in chunks(_variable(data, section, number))
+                }
+                if regions:
                     times.append(time)
-                    rows.append(parts[0].reshape(-1, 3) if section == NODE_DATA else self._at_nodes(parts, storage))
+                    rows.append(regions[0].reshape(-1, 3) if section == NODE_DATA else self._at_nodes(regions, storage))
         return Values(np.array(times), np.array(rows, dtype=np.float64)) if rows else None
 
-    def _at_nodes(self, parts: Mapping[int, NDArray[np.float32]], storage: int) -> FloatArray:
+    def _at_nodes(self, regions: Mapping[int, NDArray[np.float32]], storage: int) -> FloatArray:
         """Return a tensor (n, 6) at the nodes, not a number where no element with it is."""
         if storage not in (PER_ELEMENT, PER_NODE_OF_ELEMENT):
             raise ValueError("stored in another way")
         count = len(self.content.points)
         sums, counts = np.zeros((count, 6)), np.zeros((count, 1))
-        for tag, part in parts.items():
+        for tag, values_of_region in regions.items():
             members = self.content.domains[tag - 1]
-            values = part.astype(np.float64).reshape(-1, 6)
+            values = values_of_region.astype(np.float64).reshape(-1, 6)
             if storage == PER_ELEMENT:
                 values = values.repeat(members.shape[1], axis=0)
             np.add.at(sums, members.ravel(), values)

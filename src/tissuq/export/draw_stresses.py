@@ -83,17 +83,17 @@ class DrawStresses:
     @property
     def largest_invariants(self) -> tuple[float, float]:
         """The largest I1 - 3 and I2 - 3 of the states."""
-        first, second = self.ensemble.most
-        return REACHES[-1] * first, REACHES[-1] * second
+        largest_1, largest_2 = self.ensemble.most
+        return REACHES[-1] * largest_1, REACHES[-1] * largest_2
 
     @cached_property
     def wanted_stiffness(self) -> FloatArray:
         """The smallest stiffness (N, n) that laws may have in `stability_states`."""
         states = self.stability_states
-        least = least_eigenvalues(states.hessian(self.ensemble.stresses_at(states.nudged).T))
+        eigenvalues = least_eigenvalues(states.hessian(self.ensemble.stresses_at(states.nudged).T))
         is_beyond = self._relative_invariants(states.logs) > 1 + 1e-9
-        pairs = zip(least.T, self.modulus, strict=True)
-        return np.array([wanted_stiffness(states, is_beyond, own, float(modulus)) for own, modulus in pairs])
+        pairs = zip(eigenvalues.T, self.modulus, strict=True)
+        return np.array([wanted_stiffness(states, is_beyond, of_draw, float(modulus)) for of_draw, modulus in pairs])
 
     def _relative_invariants(self, logs: FloatArray) -> FloatArray:
         """Return the larger of both invariants of logarithmic strains (n, 3) over the largest measured one, (n,)."""
@@ -126,9 +126,9 @@ class DrawStresses:
         itself has no stress.
         """
         errors = {name: self._apart(cards, judged) / judged.size for name, judged in self.of_modes.items()}
-        apart, wanted = self._apart(cards, self.of_states), self.of_states
-        errors["states"] = (apart / wanted.size)[:, self.shell == 0]
-        largest = _largest_of_three(apart) / _largest_of_three(wanted.stress)
+        differences, wanted = self._apart(cards, self.of_states), self.of_states
+        errors["states"] = (differences / wanted.size)[:, self.shell == 0]
+        largest = _largest_of_three(differences) / _largest_of_three(wanted.stress)
         shell = self.shell[: largest.shape[1]]
         return errors | {within(reach): largest[:, shell <= number] for number, reach in enumerate(REACHES)}
 

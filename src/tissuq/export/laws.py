@@ -72,9 +72,9 @@ def exact_law(ensemble: Ensemble) -> Law | None:
     if any(draw.discrepancy is not None for draw in ensemble):
         return None
     summands = list(parts_of(ensemble))
-    fibres = [part for part in summands if not part[0].is_isotropic]
+    fibres = [summand for summand in summands if not summand[0].is_isotropic]
     if fibres:
-        return _with_fibres([part for part in summands if part[0].is_isotropic], fibres)
+        return _with_fibres([summand for summand in summands if summand[0].is_isotropic], fibres)
     if all(isinstance(material, POLYNOMIALS) for material, _ in summands):
         return _polynomial(summands)
     terms = [_ogden_terms(material, values) for material, values in summands]
@@ -88,8 +88,8 @@ def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[M
     """Return the sum of a polynomial and fibres, if they are one."""
     if not all(isinstance(material, POLYNOMIALS) for material, _ in matrix):
         return None
-    parts = [_polynomial(matrix), *(Law(*part) for part in fibres)]
-    return Law(MaterialSum.of(*(part.material for part in parts)), np.hstack([part.values for part in parts]))
+    laws = [_polynomial(matrix), *(Law(*law) for law in fibres)]
+    return Law(MaterialSum.of(*(law.material for law in laws)), np.hstack([law.values for law in laws]))
 
 
 def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:

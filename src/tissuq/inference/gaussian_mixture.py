@@ -70,8 +70,10 @@ class GaussianMixture:
         weights = np.concatenate([mixture.weights for mixture in mixtures])
         if count is not None and len(weights) > count:
             representatives, ends = systematic(weights[None], count)[0], np.cumsum([len(m) for m in mixtures])
-            parts = np.split(representatives, np.searchsorted(representatives, ends[:-1]))
-            mixtures = [mixtures[i][part - ends[i] + len(mixtures[i])] for i, part in enumerate(parts)]
+            indices_of_mixtures = np.split(representatives, np.searchsorted(representatives, ends[:-1]))
+            mixtures = [
+                mixtures[i][indices - ends[i] + len(mixtures[i])] for i, indices in enumerate(indices_of_mixtures)
+            ]
             weights = np.full(count, weights.sum() / count)
         p, r = (max(mixture.root.shape[axis] for mixture in mixtures) for axis in (1, 2))
         mean, root = np.zeros((len(weights), p)), np.zeros((len(weights), p, r))
@@ -149,8 +151,8 @@ class GaussianMixture:
 
     def merged(self) -> GaussianMixture:
         """Return the same distribution, components that equal their predecessor merged with it."""
-        first = self._first_of_equals()
-        return self[first].weighted(np.add.reduceat(self.weights, first))
+        first_of_equals = self._first_of_equals()
+        return self[first_of_equals].weighted(np.add.reduceat(self.weights, first_of_equals))
 
     def _first_of_equals(self) -> NDArray[np.intp]:
         """Return the indices of the components that differ from their predecessor in more than the weight."""
@@ -158,8 +160,8 @@ class GaussianMixture:
         is_new[0] = True
         for array in (self.settings, self.mean, self.member, self.root):
             if array is not None:
-                others = np.flatnonzero(~is_new)
-                is_new[others] = (array[others] != array[others - 1]).any(axis=tuple(range(1, array.ndim)))
+                candidates = np.flatnonzero(~is_new)
+                is_new[candidates] = (array[candidates] != array[candidates - 1]).any(axis=tuple(range(1, array.ndim)))
         return np.flatnonzero(is_new)
 
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], NDArray[Any]]]:
@@ -169,12 +171,12 @@ class GaussianMixture:
         triangular and padded with zeros where members have different numbers of weights, there are the entries that
         are not zero and a bit for every entry that tells which these are.
         """
-        first = self._first_of_equals()
-        distinct = self[first]
+        first_of_equals = self._first_of_equals()
+        distinct = self[first_of_equals]
         is_nonzero = distinct.root != 0
         arrays: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = {
             "weights": (("component",), self.weights),
-            "copies": (("distinct",), np.diff(first, append=len(self))),
+            "copies": (("distinct",), np.diff(first_of_equals, append=len(self))),
             "settings": (("distinct", "nonlinear"), distinct.settings),
             "mean": (("distinct", "linear"), distinct.mean),
             "root": (("entry",), distinct.root[is_nonzero]),

@@ -33,36 +33,36 @@ def highest(
     >>> round(place, 6), round(value, 6)
     (1.7, 3.0)
     """
-    known = {place: function(place) for place in (start - step, start, start + step)}
+    values = {point: function(point) for point in (start - step, start, start + step)}
     widest = 1.5 * step
-    while len(known) < MAX_EVALUATIONS:
-        places = sorted(known)
-        best = max(places, key=lambda place: known[place])
-        index = places.index(best)
-        if index in (0, len(places) - 1):
+    while len(values) < MAX_EVALUATIONS:
+        points = sorted(values)
+        best = max(points, key=lambda point: values[point])
+        index = points.index(best)
+        if index in (0, len(points) - 1):
             step *= 2
-            place = float(np.clip(best + (step if index else -step), start - reach, start + reach))
-            if place == best:
+            point = float(np.clip(best + (step if index else -step), start - reach, start + reach))
+            if point == best:
                 break
         else:
-            neighbours = places[index - 1 : index + 2]
+            neighbours = points[index - 1 : index + 2]
             farther = max((neighbours[0], neighbours[2]), key=lambda neighbour: abs(neighbour - best))
-            place, value = _top(neighbours, [known[neighbour] for neighbour in neighbours])
+            point, value = _top(neighbours, [values[neighbour] for neighbour in neighbours])
             if abs(farther - best) > widest:  # a parabola says little
-                place = 0.5 * (farther + best)
-            elif value < known[best] + accuracy:
-                return place, value
-        known[place] = function(place)
-    best = max(known, key=lambda place: known[place])
-    return best, known[best]
+                point = 0.5 * (farther + best)
+            elif value < values[best] + accuracy:
+                return point, value
+        values[point] = function(point)
+    best = max(values, key=lambda point: values[point])
+    return best, values[best]
 
 
-def _top(places: list[float], values: list[float]) -> tuple[float, float]:
+def _top(points: list[float], values: list[float]) -> tuple[float, float]:
     """Return the top of the parabola through three ascending places, of which the middle one has the largest value."""
-    before, after = places[0] - places[1], places[2] - places[1]
+    distance_before, distance_after = points[0] - points[1], points[2] - points[1]
     drop_before, drop_after = values[0] - values[1], values[2] - values[1]
-    curvature = (drop_after / after - drop_before / before) / (after - before)
-    slope = drop_after / after - curvature * after
+    curvature = (drop_after / distance_after - drop_before / distance_before) / (distance_after - distance_before)
+    slope = drop_after / distance_after - curvature * distance_after
     if curvature >= 0:  # all three are alike
-        return places[1], values[1]
-    return float(places[1] - 0.5 * slope / curvature), float(values[1] - 0.25 * slope**2 / curvature)
+        return points[1], values[1]
+    return float(points[1] - 0.5 * slope / curvature), float(values[1] - 0.25 * slope**2 / curvature)

@@ -47,11 +47,11 @@ def answer(described: Sequence[Described], drawn: Panels, unit: StressUnit) -> N
     """Draw every measured curve with its bands on a panel of its own, and the discrepancy's share on the strips."""
     solution, prob = described[0].solution, described[0].prob
     curves = solution.model.experiment.curves
-    for number, (axis, of) in enumerate(zip(drawn.axes, described, strict=True)):
-        curve = of.curve
-        _draw(axis, of, unit)
+    for number, (axis, described_curve) in enumerate(zip(drawn.axes, described, strict=True)):
+        curve = described_curve.curve
+        _draw(axis, described_curve, unit)
         if drawn.is_new:
-            axis.set_title(_title(of, len(described) > 1, drawn.letters))
+            axis.set_title(_title(described_curve, len(described) > 1, drawn.letters))
         if number % drawn.columns == 0 or not _is_one_stress(solution):
             axis.set_ylabel(f"{curve.quantity.replace(LONG, SHORT)} [{unit.name}]")
     if drawn.strips:
@@ -68,8 +68,8 @@ def answer_on_new_figure(described: Sequence[Described], unit: StressUnit, *, is
     """
     count = len(described)
     columns = 1 if is_narrow else columns_of(count)
-    (width, height), further = (NARROW, NARROW_ROW) if is_narrow else (WIDE, WIDE_ROW)
-    tall = height + further * (-(-count // columns) - 1)
+    (width, height), row_size = (NARROW, NARROW_ROW) if is_narrow else (WIDE, WIDE_ROW)
+    tall = height + row_size * (-(-count // columns) - 1)
     letters = NARROW_LETTERS if is_narrow else WIDE_LETTERS
     style = STYLE | {"font.size": letters, "axes.titlesize": letters, "figure.dpi": PIXELS}
     with new_figure(width / PIXELS, tall / PIXELS, style) as figure:
@@ -94,20 +94,20 @@ def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) ->
 
 def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     """Return the first measured curve and its band as a small SVG, at little cost: few components make the band."""
-    curves, few = solution.model.experiment.curves, solution.mixture.thinned(FEW)
+    curves, mixture = solution.model.experiment.curves, solution.mixture.thinned(FEW)
     curve, count = curves[0], f", 1 of {len(curves)}" if len(curves) > 1 else ""
     across = points_along(curve, SMALL_POINTS)
-    rough = replace(solution, represent=lambda: few)
+    rough = replace(solution, represent=lambda: mixture)
     of_curve = predict_band(rough, across, mode=curve.mode, channel=curve.channel)
     low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
     measured = curve.stress / unit.to_mpa
     limits = limits_of([measured, median], [low, high])
     with small_panels(1) as (figure, drawn):
         (axis,) = drawn.axes
-        for places, is_curve in ways_of(curve.mode, across, of_curve.stretch):
-            band(axis, of_curve.stretch[places], within(low[places], limits), within(high[places], limits),
+        for indices, is_curve in ways_of(curve.mode, across, of_curve.stretch):
+            band(axis, of_curve.stretch[indices], within(low[indices], limits), within(high[indices], limits),
                  is_path=is_curve)  # fmt: skip
-            line(axis, of_curve.stretch[places], median[places], is_path=is_curve)
+            line(axis, of_curve.stretch[indices], median[indices], is_path=is_curve)
         points(axis, curve.abscissa, measured)
         axis.set_ylim(limits)
         end = f" [{unit.name}]{count}"
@@ -118,31 +118,33 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
 def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     """Draw the bands of a curve, the material alone and the measurements; of several paths lines for the latter two."""
     curve, percent, is_one = described.curve, f"{100 * described.prob:.4g} %", len(described.ways) == 1
-    alone = described.stress_alone if described.has_discrepancy else None
+    material_stress = described.stress_alone if described.has_discrepancy else None
     measured, error = curve.stress / unit.to_mpa, curve.standard_error / unit.to_mpa
     core = [measured - error, measured + error, described.stress.median / unit.to_mpa]
-    beyond = [end / unit.to_mpa for of in (described.measurements, described.stress) for end in (of.low, of.high)]
-    limits = limits_of(core, [*beyond, *([alone.median / unit.to_mpa] if alone else [])])
+    limit_values = [
+        end / unit.to_mpa for shown in (described.measurements, described.stress) for end in (shown.low, shown.high)
+    ]
+    limits = limits_of(core, [*limit_values, *([material_stress.median / unit.to_mpa] if material_stress else [])])
     bands = [(described.measurements, 0.18 if is_one else 0.12, BAND, f"{percent} of measurements")]
     bands += [(described.stress, 0.38, BAND, f"{percent} of the stress")] if is_one else []
-    bands += [(alone, 0.13, TRUTH, "")] if alone and is_one else []
+    bands += [(material_stress, 0.13, TRUTH, "")] if material_stress and is_one else []
     lines = [(described.stress, BAND, "-", "" if is_one else "stress, median")]
     material = described.solution.model.material.name
-    lines += [(alone, TRUTH, "--", f"{material} alone{f', {percent}' * is_one}")] if alone else []
-    for number, (places, is_curve) in enumerate(described.ways):
-        for of, strength, color, label in bands:
-            low, high = (within(end[places] / unit.to_mpa, limits) for end in (of.low, of.high))
-            band(axis, of.stretch[places], low, high, color=color, strength=strength, is_path=is_curve,
+    lines += [(material_stress, TRUTH, "--", f"{material} alone{f', {percent}' * is_one}")] if material_stress else []
+    for number, (indices, is_curve) in enumerate(described.ways):
+        for shown, strength, color, label in bands:
+            low, high = (within(end[indices] / unit.to_mpa, limits) for end in (shown.low, shown.high))
+            band(axis, shown.stretch[indices], low, high, color=color, strength=strength, is_path=is_curve,
                  label="" if number else label)  # fmt: skip
-        for of, color, style, label in lines:
-            median = within(of.median[places] / unit.to_mpa, limits)
-            line(axis, of.stretch[places], median, color=color, style=style, width=1.3, is_path=is_curve,
+        for shown, color, style, label in lines:
+            median = within(shown.median[indices] / unit.to_mpa, limits)
+            line(axis, shown.stretch[indices], median, color=color, style=style, width=1.3, is_path=is_curve,
                  label="" if number else label)  # fmt: skip
-        rows = slice(None) if is_one else places
+        rows = slice(None) if is_one else indices
         points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
                marker=MARKERS[number % len(MARKERS)])  # fmt: skip
     axis.set_ylim(limits)
-    cut_off(axis, beyond[0], beyond[1], unit.name)
+    cut_off(axis, limit_values[0], limit_values[1], unit.name)
     axis.locator_params(axis="x", nbins=6)
 
 
@@ -175,23 +177,23 @@ def _draw_strips(drawn: Panels, solution: Solution, prob: float) -> None:
 
 def _draw_share(axis: Axes, solution: Solution, curve: Any, prob: float) -> None:
     """Draw the share of a curve's stress that the discrepancy carries, in percent, within -100 and 100."""
-    ways, at, shares = share_along(solution, curve, prob)
+    ways, abscissa, shares = share_along(solution, curve, prob)
     low, median, high = 100 * shares
     axis.axhline(0, color=BASE, lw=0.8 * relative_size(), zorder=0.5)
     axis.set_ylim(_share_limits(low, high))
-    for number, (places, is_curve) in enumerate(ways):
-        low_end, middle, high_end = (np.clip(values[places], -MOST_SHARE, MOST_SHARE) for values in (low, median, high))
-        band(axis, at[places], low_end, high_end, color=INK, strength=0.2, is_path=is_curve,
+    for number, (indices, is_curve) in enumerate(ways):
+        low_end, middle, high_end = (np.clip(end[indices], -MOST_SHARE, MOST_SHARE) for end in (low, median, high))
+        band(axis, abscissa[indices], low_end, high_end, color=INK, strength=0.2, is_path=is_curve,
              label="" if number else f"{100 * prob:.4g} % of the share")  # fmt: skip
-        line(axis, at[places], middle, color=INK, width=1.2, is_path=is_curve, label="" if number else "median")
+        line(axis, abscissa[indices], middle, color=INK, width=1.2, is_path=is_curve, label="" if number else "median")
 
 
 def _share_limits(low: Any, high: Any) -> tuple[float, float]:
     """Return limits in percent that show zero and the band, as far as a hundred percent."""
-    known = np.isfinite(low) & np.isfinite(high)
-    if not known.any():
+    is_finite = np.isfinite(low) & np.isfinite(high)
+    if not is_finite.any():
         return -10.0, 10.0
-    ends = np.clip([low[known].min(), high[known].max()], -100, 100)
+    ends = np.clip([low[is_finite].min(), high[is_finite].max()], -100, 100)
     low_end, high_end = min(ends[0], 0.0), max(ends[1], 0.0)
     air = 0.08 * max(high_end - low_end, 4.0)
     return low_end - air, high_end + air

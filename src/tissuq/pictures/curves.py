@@ -131,15 +131,17 @@ def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list
         return [Way(np.argsort(abscissa, kind="stable"), True)]
     size = np.linalg.norm(points - mode.reference, axis=1)
     starts = 1 + np.flatnonzero(np.diff(size) < -RETURN * np.ptp(size))
-    parts = np.split(np.arange(len(points)), starts)
-    nearly, least = NEARLY * np.ptp(points, axis=0), NEARLY * np.ptp(abscissa)
+    branches = np.split(np.arange(len(points)), starts)
+    nearly, smallest_change = NEARLY * np.ptp(points, axis=0), NEARLY * np.ptp(abscissa)
     ways = []
-    for part in parts:
-        order = part[np.argsort(abscissa[part], kind="stable")]
-        others, along = np.diff(points[order], axis=0), np.diff(abscissa[order])
-        is_one = ((others >= -nearly).all(axis=0) | (others <= nearly).all(axis=0)).all() and (along > 0).all()
-        is_held = along.sum() <= least
-        if len(parts) > MOST_WAYS or not (is_one or is_held):
+    for branch in branches:
+        order = branch[np.argsort(abscissa[branch], kind="stable")]
+        control_changes, along = np.diff(points[order], axis=0), np.diff(abscissa[order])
+        is_one = ((control_changes >= -nearly).all(axis=0) | (control_changes <= nearly).all(axis=0)).all() and (
+            along > 0
+        ).all()
+        is_held = along.sum() <= smallest_change
+        if len(branches) > MOST_WAYS or not (is_one or is_held):
             return [Way(np.argsort(abscissa, kind="stable"), False)]
         ways.append(Way(order, not is_held))
     return ways

@@ -132,21 +132,21 @@ def predictions(
     return _predictions(solution, mode, stretches_to_show(solution, mode, 0.0), prob)
 
 
-def _predictions(solution: Solution, mode: LoadingMode, at: FloatArray, prob: float) -> list[Predicted]:
+def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob: float) -> list[Predicted]:
     data, model = solution.model.experiment, solution.model
     is_joint, several = speaks_of(model, mode), len(mode.controls) > 1
     predictions = []
     for channel, quantity in enumerate(mode.stresses):
         options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
-        noisy, stress = predict_bands([(1.0, solution)], at, (True, False), **options)
+        noisy, stress = predict_bands([(1.0, solution)], points, (True, False), **options)
         predictions.append(
             Predicted(
                 abscissa=stress.stretch,
                 stress=stress,
                 measurements=noisy,
-                is_calibrated=is_calibrated(data, mode, at),
+                is_calibrated=is_calibrated(data, mode, points),
                 calibrated=None if several else calibrated_range(data, mode),
-                ways=ways_of(mode, at, stress.stretch),
+                ways=ways_of(mode, points, stress.stretch),
                 measured=_measured(solution, mode, channel),
                 label="stretch" if several else mode.controls[0].name,
                 title=mode.name if is_joint else f"{mode.name}\n{model.material.name} alone, discrepancy unknown",
@@ -158,28 +158,28 @@ def _predictions(solution: Solution, mode: LoadingMode, at: FloatArray, prob: fl
 
 def prediction(drawn: Panels, predicted: Sequence[Predicted], unit: StressUnit, prob: float = 0.95) -> None:
     """Draw every stress on a panel of its own."""
-    for axis, of in zip(drawn.axes, predicted, strict=True):
-        draw_predicted(axis, of, unit, predicted_limits([of]), prob)
-        axis.set_ylabel(f"{of.quantity} [{unit.name}]")
-        axis.set_xlabel(of.label)
+    for axis, prediction_of_mode in zip(drawn.axes, predicted, strict=True):
+        draw_predicted(axis, prediction_of_mode, unit, predicted_limits([prediction_of_mode]), prob)
+        axis.set_ylabel(f"{prediction_of_mode.quantity} [{unit.name}]")
+        axis.set_xlabel(prediction_of_mode.label)
         if drawn.is_new:
-            axis.set_title(of.title)
+            axis.set_title(prediction_of_mode.title)
     drawn.explain()
 
 
 def predicted_limits(predicted: Sequence[Predicted]) -> tuple[float, float]:
     """Return the ends of an axis, MPa: what is measured, the medians, and of bands what is not far from them."""
-    core, known_ends, beyond = list[FloatArray](), list[FloatArray](), list[FloatArray]()
-    for of in predicted:
-        known = _known(of)
-        core += [of.stress.median[known], *([of.measured.stress] if of.measured is not None else [])]
-        known_ends += [values[known] for values in (of.measurements.low, of.measurements.high)]
-        beyond += [of.measurements.low, of.measurements.high]
+    core, known_ends, possible_limits = list[FloatArray](), list[FloatArray](), list[FloatArray]()
+    for curve in predicted:
+        is_calibrated = _known(curve)
+        core += [curve.stress.median[is_calibrated], *([curve.measured.stress] if curve.measured is not None else [])]
+        known_ends += [values[is_calibrated] for values in (curve.measurements.low, curve.measurements.high)]
+        possible_limits += [curve.measurements.low, curve.measurements.high]
     core.append(np.array(limits_of(core, known_ends, KNOWN_MARGIN)))
     low, high = limits_of(core, [])
     extent = high - low
-    medians = [np.clip(of.stress.median, low - extent, high + extent) for of in predicted]
-    near = [np.clip(ends, low - NEAR_MARGIN * extent, high + NEAR_MARGIN * extent) for ends in beyond]
+    medians = [np.clip(curve.stress.median, low - extent, high + extent) for curve in predicted]
+    near = [np.clip(ends, low - NEAR_MARGIN * extent, high + NEAR_MARGIN * extent) for ends in possible_limits]
     return limits_of([*core, *medians, *near], [])
 
 
@@ -192,30 +192,32 @@ def draw_predicted(
     axis: Axes, predicted: Predicted, unit: StressUnit, limits: tuple[float, float], prob: float = 0.95
 ) -> None:
     """Draw bands, measurements and where nothing was measured; ``limits`` of the stress are in MPa."""
-    scale, percent, at = unit.to_mpa, f"{100 * prob:.4g} %", predicted.abscissa
+    scale, percent, abscissa = unit.to_mpa, f"{100 * prob:.4g} %", predicted.abscissa
     ends = limits[0] / scale, limits[1] / scale
-    for number, (places, is_curve) in enumerate(predicted.ways):
+    for number, (indices, is_curve) in enumerate(predicted.ways):
         for of, strength, label in (
             (predicted.measurements, 0.18, f"{percent} of measurements"),
             (predicted.stress, 0.38, f"{percent} of the stress"),
         ):
-            low, high = within(of.low[places] / scale, ends), within(of.high[places] / scale, ends)
+            low, high = within(of.low[indices] / scale, ends), within(of.high[indices] / scale, ends)
             label = "" if number else label
-            band(axis, at[places], low, high, strength=strength, label=label, is_path=is_curve)
-        median = within(predicted.stress.median[places] / scale, ends)
-        line(axis, at[places], median, label="" if number else "predicted median", is_path=is_curve)
-    margin = 0.02 * max(float(np.ptp(at)), 0.1 * abs(float(at.max())))
-    axis.set_xlim(at.min() - margin, at.max() + margin)
+            band(axis, abscissa[indices], low, high, strength=strength, label=label, is_path=is_curve)
+        median = within(predicted.stress.median[indices] / scale, ends)
+        line(axis, abscissa[indices], median, label="" if number else "predicted median", is_path=is_curve)
+    margin = 0.02 * max(float(np.ptp(abscissa)), 0.1 * abs(float(abscissa.max())))
+    axis.set_xlim(abscissa.min() - margin, abscissa.max() + margin)
     axis.set_ylim(ends)
-    known = _known(predicted)
-    cut_off(axis, predicted.measurements.low[known] / scale, predicted.measurements.high[known] / scale, unit.name)
+    in_range = _known(predicted)
+    cut_off(
+        axis, predicted.measurements.low[in_range] / scale, predicted.measurements.high[in_range] / scale, unit.name
+    )
     axis.locator_params(axis="x", nbins=6)
     size = relative_size()
     if predicted.calibrated is not None:
         outside(axis, *predicted.calibrated, "extrapolated")
     elif not predicted.is_calibrated.all():
-        beyond = at[~predicted.is_calibrated]
-        axis.plot(beyond, np.zeros_like(beyond), "|", color=BASE, ms=8 * size, transform=axis.get_xaxis_transform(),
+        farther = abscissa[~predicted.is_calibrated]
+        axis.plot(farther, np.zeros_like(farther), "|", color=BASE, ms=8 * size, transform=axis.get_xaxis_transform(),
                   label="extrapolated", clip_on=False)  # fmt: skip
     if predicted.measured is None:
         return

@@ -219,7 +219,7 @@ class LawComparison:
     def _row(self, name: str, posterior: Posterior) -> dict[str, Any]:
         share, _ = shares_of_discrepancy(posterior.solution)
         stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
-        beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
+        ranges_beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
         modulus = self._moduli[name]
         r_squared, nrmse = _quality(self.alone[name]) if name in self.alone else (np.nan, np.nan)
         return {
@@ -230,7 +230,7 @@ class LawComparison:
             "nrmse": nrmse,
             **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),
             "stable": min(stable, default=np.nan),
-            "stable_beyond": min((of_mode.probability for of_mode in beyond), default=np.nan),
+            "stable_beyond": min((of_mode.probability for of_mode in ranges_beyond), default=np.nan),
             "modulus": float(modulus.quantile(0.5)),
             **dict(zip(("modulus_low", "modulus_high"), modulus.hdi(), strict=True)),
             "seconds": self.seconds[name],
@@ -293,16 +293,18 @@ def fit_laws(
     for name, law in candidates.items():
         step(name)
         start = perf_counter()
-        others = symbols - {parameter.symbol for parameter in law.parameters}
-        chosen = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in others}
+        foreign_symbols = symbols - {parameter.symbol for parameter in law.parameters}
+        chosen_priors = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in foreign_symbols}
         try:
-            posterior = fit(data, material=law, priors=chosen, **options)
+            posterior = fit(data, material=law, priors=chosen_priors, **options)
             fits[name] = replace(posterior, solution=copy(posterior.solution))  # without what it was computed from
             seconds[name] = perf_counter() - start
-            own = {symbol: prior for symbol, prior in chosen.items() if symbol in fits[name].model.material_symbols}
+            material_priors = {
+                symbol: prior for symbol, prior in chosen_priors.items() if symbol in fits[name].model.material_symbols
+            }
             without = options | {"discrepancy": "none", "tolerances": "as-tested"}
             with suppress(ConvergenceError, ModelError):
-                alone[name] = fit(data, material=law, priors=own, **without)
+                alone[name] = fit(data, material=law, priors=material_priors, **without)
         except (ConvergenceError, ModelError, InputError) as error:
             if not is_all or (not fits and isinstance(error, InputError)):
                 raise
@@ -326,11 +328,11 @@ def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:
         When there is no such law, or one is named twice.
     """
     if laws == ALL_LAWS:
-        every = [kind() for kind in materials().values()]
-        return {law.name: law for law in sorted(every, key=lambda law: len(law.parameters)) if law.is_isotropic}
-    found = [material_named(law) for law in ([laws] if isinstance(laws, str) else laws)]
-    by_name = {law.name: law for law in found}
-    if len(by_name) < len(found):
+        all_laws = [kind() for kind in materials().values()]
+        return {law.name: law for law in sorted(all_laws, key=lambda law: len(law.parameters)) if law.is_isotropic}
+    named_laws = [material_named(law) for law in ([laws] if isinstance(laws, str) else laws)]
+    by_name = {law.name: law for law in named_laws}
+    if len(by_name) < len(named_laws):
         raise InputError("a law is named twice: name each of the laws once.")
     return by_name
 

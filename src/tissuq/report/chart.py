@@ -113,26 +113,26 @@ def chart_data(
 
 def _measured(described: Sequence[Described]) -> Iterator[_Test]:
     """Yield the measured curves, of those with several paths each path."""
-    for of in described:
-        curve = of.curve
+    for described_curve in described:
+        curve = described_curve.curve
         name = curve.name if len(described) > 1 else curve.mode.name
         name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
-        for number, (places, is_curve) in enumerate(of.ways, 1):
-            rows = _spread(np.argsort(curve.abscissa, kind="stable") if of.points.ndim == 1 else places)
-            named = f"{name}, path {number}" if len(of.ways) > 1 else name
-            points = of.points[_drawn(places, is_curve)]
+        for number, (indices, is_curve) in enumerate(described_curve.ways, 1):
+            rows = _spread(np.argsort(curve.abscissa, kind="stable") if described_curve.points.ndim == 1 else indices)
+            named = f"{name}, path {number}" if len(described_curve.ways) > 1 else name
+            points = described_curve.points[_drawn(indices, is_curve)]
             yield _Test(named, curve.mode, curve.channel, points, curve.abscissa[rows], curve.stress[rows], is_curve)
 
 
-def _spread(places: NDArray[np.intp]) -> NDArray[np.intp]:
+def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return so many places as are drawn, spread over all."""
-    count = min(len(places), MAX_MEASUREMENTS)
-    return np.asarray(places[np.unique(np.linspace(0, len(places) - 1, count).astype(int))])
+    count = min(len(indices), MAX_MEASUREMENTS)
+    return np.asarray(indices[np.unique(np.linspace(0, len(indices) - 1, count).astype(int))])
 
 
-def _drawn(places: NDArray[np.intp], is_curve: bool) -> NDArray[np.intp]:
+def _drawn(indices: NDArray[np.intp], is_curve: bool) -> NDArray[np.intp]:
     """Return the places at which bands are drawn: where they are no curve, those of the measurements that are."""
-    return places if is_curve else _spread(places)
+    return indices if is_curve else _spread(indices)
 
 
 def _others(posterior: Posterior) -> Iterator[_Test]:
@@ -145,11 +145,11 @@ def _others(posterior: Posterior) -> Iterator[_Test]:
 
 
 def _of_measured(described: Sequence[Described]) -> Iterator[_Bands | None]:
-    for of in described:
-        for places, is_curve in of.ways:
-            drawn = _drawn(places, is_curve)
-            alone = _at(of.stress_alone, drawn) if of.has_discrepancy else None
-            yield _Bands(_at(of.measurements, drawn), _at(of.stress, drawn), alone)
+    for described_curve in described:
+        for indices, is_curve in described_curve.ways:
+            drawn = _drawn(indices, is_curve)
+            material_stress = _at(described_curve.stress_alone, drawn) if described_curve.has_discrepancy else None
+            yield _Bands(_at(described_curve.measurements, drawn), _at(described_curve.stress, drawn), material_stress)
 
 
 def _of_others(posterior: Posterior, tests: Sequence[_Test]) -> Iterator[_Bands | None]:
@@ -160,17 +160,17 @@ def _of_others(posterior: Posterior, tests: Sequence[_Test]) -> Iterator[_Bands 
             continue
         try:
             measurements, stress = predict_bands(weighted, test.points, (True, False), mode=test.mode)
-            alone = None
+            material_stress = None
             if posterior.model.discrepancy.parameters:
-                (alone,) = predict_bands(weighted, test.points, (False,), discrepancy=False, mode=test.mode)
+                (material_stress,) = predict_bands(weighted, test.points, (False,), discrepancy=False, mode=test.mode)
         except TissuqError:
             yield None
         else:
-            yield _Bands(measurements, stress, alone)
+            yield _Bands(measurements, stress, material_stress)
 
 
-def _at(band: Band, places: NDArray[np.intp]) -> Band:
-    return Band(*(values[places] for values in (band.stretch, band.median, band.low, band.high)))
+def _at(band: Band, indices: NDArray[np.intp]) -> Band:
+    return Band(*(values[indices] for values in (band.stretch, band.median, band.low, band.high)))
 
 
 def _columns(bands: _Bands, test: _Test, unit: StressUnit) -> dict[str, Any]:

@@ -89,9 +89,9 @@ def predictive_figure(
     computed : mapping of str to sequence of Described, optional
         What the posteriors say of their curves, of which nothing is computed anew.
     """
-    known = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
+    described = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     curves = next(iter(posteriors.values())).model.experiment.curves
-    panels = [(name, of) for name in posteriors for of in known[name]]
+    panels = [(name, of) for name in posteriors for of in described[name]]
     columns = columns_of(len(panels))
     with new_figure(WIDTHS[columns], 3.3 * -(-len(panels) // columns) + 0.5) as figure:
         drawn = on_figure(figure, len(panels), columns)
@@ -101,13 +101,13 @@ def predictive_figure(
             posterior, curve, of_panel = posteriors[name], of_curve.curve, bands[index]
             inside = posterior.inside_bands(discrepancy=discrepancy)[index % len(curves)].sum()
             axis.set_title(f"{_label(posteriors, name, curve, drawn.letters)}{inside} of {len(curve)} inside")
-            for places, is_curve in of_curve.ways:
-                low, high, median = (of[places] / unit.to_mpa for of in (of_panel.low, of_panel.high, of_panel.median))
-                band(axis, of_panel.stretch[places], low, high, is_path=is_curve, label="95 % predictive band")
-                line(axis, of_panel.stretch[places], median, is_path=is_curve, label="predicted median")
+            for indices, is_curve in of_curve.ways:
+                low, high, median = (of[indices] / unit.to_mpa for of in (of_panel.low, of_panel.high, of_panel.median))
+                band(axis, of_panel.stretch[indices], low, high, is_path=is_curve, label="95 % predictive band")
+                line(axis, of_panel.stretch[indices], median, is_path=is_curve, label="predicted median")
                 if name != "none" and base:
                     none = base[index % len(curves)]
-                    line(axis, none.stretch[places], none.median[places] / unit.to_mpa, color=BASE, style=":",
+                    line(axis, none.stretch[indices], none.median[indices] / unit.to_mpa, color=BASE, style=":",
                          width=1.4, is_path=is_curve, label="median of the fit 'none'")  # fmt: skip
             if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
                 ends = float(of_panel.stretch[0]), float(of_panel.stretch[-1])

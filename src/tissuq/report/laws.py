@@ -184,12 +184,12 @@ def curve_figure(study: LawStudy) -> Figure:
         axes = on_figure(figure, len(curves), columns).axes
         for axis, curve in zip(axes, curves, strict=True):
             pieces.points(axis, curve.abscissa, curve.stress / scale, color=BASE)
-            at = points_along(curve, LINE_POINTS)
+            points = points_along(curve, LINE_POINTS)
             options: dict[str, Any] = {"noise": False, "mode": curve.mode, "channel": curve.channel}
             for number, name in enumerate(names):
-                found = predict_band(study.comparison.alone[name].solution, at, **options)
-                for places, is_curve in ways_of(curve.mode, at, found.stretch):
-                    pieces.line(axis, found.stretch[places], found.median[places] / scale, color=SERIES[number],
+                band = predict_band(study.comparison.alone[name].solution, points, **options)
+                for indices, is_curve in ways_of(curve.mode, points, band.stretch):
+                    pieces.line(axis, band.stretch[indices], band.median[indices] / scale, color=SERIES[number],
                                 width=1.2, is_path=is_curve, label=name)  # fmt: skip
             axis.set_title(curve.name)
             axis.set_xlabel(curve.mode.controls[0].name)

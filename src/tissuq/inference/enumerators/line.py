@@ -77,8 +77,8 @@ class Line:
         points = np.interp(fractions, np.arange(len(self.places)), self.places)
         heights = self.logs - self.logs.max()
         interval = np.minimum(fractions.astype(int), len(heights) - 2)
-        most = np.maximum(heights[:-1], heights[1:])[interval] + MAX_EXCESS
-        return points, np.exp(np.minimum(Akima1DInterpolator(self.places, heights)(points), most))
+        largest_heights = np.maximum(heights[:-1], heights[1:])[interval] + MAX_EXCESS
+        return points, np.exp(np.minimum(Akima1DInterpolator(self.places, heights)(points), largest_heights))
 
     @cached_property
     def log_masses(self) -> FloatArray:
@@ -86,10 +86,10 @@ class Line:
         points, density = self._table
         cells = density * np.gradient(points)
         position = np.interp(points, self.places, np.arange(len(self.places)))
-        before = np.minimum(position.astype(int), len(self.places) - 2)
-        after = position - before
-        masses = np.bincount(before, cells * (1 - after), len(self.places))
-        masses[1:] += np.bincount(before, cells * after, len(self.places))[:-1]
+        lower_index = np.minimum(position.astype(int), len(self.places) - 2)
+        share = position - lower_index
+        masses = np.bincount(lower_index, cells * (1 - share), len(self.places))
+        masses[1:] += np.bincount(lower_index, cells * share, len(self.places))[:-1]
         return np.asarray(np.log(np.maximum(masses, 1e-300)) + self.logs.max())
 
     @property
@@ -124,19 +124,19 @@ def peaks(log_density: Callable[[float], float], end: float) -> FloatArray:
 
     These are about a standard deviation away.
     """
-    places = np.linspace(-end, end, PEAK_PLACES)
-    logs = np.nan_to_num([log_density(place) for place in places], nan=-1e300, neginf=-1e300)
+    grid = np.linspace(-end, end, PEAK_PLACES)
+    logs = np.nan_to_num([log_density(point) for point in grid], nan=-1e300, neginf=-1e300)
     inner = logs[1:-1]
     tops = 1 + np.flatnonzero((inner >= logs[:-2]) & (inner > logs[2:]) & (inner > logs.max() - MAX_PEAK_DROP))
-    return np.array([place for top in tops for place in _about(log_density, places[top], places[1] - places[0])])
+    return np.array([point for top in tops for point in _about(log_density, grid[top], grid[1] - grid[0])])
 
 
 def _about(log_density: Callable[[float], float], top: float, step: float) -> FloatArray:
     """Return a peak near a place, by parabolas, and places a standard deviation beside it."""
     for _ in range(PARABOLAS):
-        before, here, after = (log_density(top + side * step) for side in (-1, 0, 1))
-        curvature = max((2 * here - before - after) / step**2, 1e-12)
-        top += float(np.clip((after - before) / (2 * step * curvature), -step, step))
+        value_before, value, value_after = (log_density(top + side * step) for side in (-1, 0, 1))
+        curvature = max((2 * value - value_before - value_after) / step**2, 1e-12)
+        top += float(np.clip((value_after - value_before) / (2 * step * curvature), -step, step))
         step = min(0.5 * step, curvature**-0.5)
     return np.asarray(top + min(curvature**-0.5, FIRST_END / FIRST_PLACES) * np.array([-1.0, 0.0, 1.0]))
 
@@ -144,8 +144,8 @@ def _about(log_density: Callable[[float], float], top: float, step: float) -> Fl
 def _apart(places: FloatArray) -> FloatArray:
     """Return ascending places without those that are much closer to the one before than others are."""
     gaps = np.diff(places)
-    around = np.minimum(np.append(np.inf, gaps[:-1]), np.append(gaps[1:], np.inf))
-    is_apart = np.append(True, gaps > MIN_RELATIVE_GAP * np.where(np.isfinite(around), around, 0.0))
+    smaller_gaps = np.minimum(np.append(np.inf, gaps[:-1]), np.append(gaps[1:], np.inf))
+    is_apart = np.append(True, gaps > MIN_RELATIVE_GAP * np.where(np.isfinite(smaller_gaps), smaller_gaps, 0.0))
     return np.asarray(places[is_apart])
 
 
@@ -168,22 +168,22 @@ def known_along(
         No place is farther from zero.
     accuracy : Accuracy
     """
-    known: dict[float, float] = {}
+    log_densities: dict[float, float] = {}
     new = set(_apart(np.unique(np.clip(list(places), -end, end))).tolist())
-    while new and len(known) < MAX_PLACES:
-        known |= {place: log_density(place) for place in sorted(new)}
-        ordered = np.array(sorted(known))
-        logs = np.nan_to_num([known[place] for place in ordered], nan=-np.inf)
+    while new and len(log_densities) < MAX_PLACES:
+        log_densities |= {point: log_density(point) for point in sorted(new)}
+        ordered = np.array(sorted(log_densities))
+        logs = np.nan_to_num([log_densities[point] for point in ordered], nan=-np.inf)
         logs = np.maximum(logs, logs.max() - MAX_DROP)
         matters = logs > logs.max() - NEGLIGIBLE_DROP
         is_rough = (matters[1:] | matters[:-1]) & (np.abs(np.diff(logs)) > accuracy.max_difference)
         is_rough |= Line(ordered, logs).shares_between > accuracy.max_share
         is_rough &= np.diff(ordered) > MIN_INTERVAL
         new = set(0.5 * (ordered[1:] + ordered[:-1])[is_rough])
-        beyond = 2 * ordered[[0, -1]] - ordered[[1, -2]]
+        outer_ends = 2 * ordered[[0, -1]] - ordered[[1, -2]]
         at_ends = logs[[0, -1]] > logs.max() - accuracy.end_drop
-        new |= set(np.clip(beyond, -end, end)[at_ends])
-        new -= set(known)
-    first, last = np.flatnonzero(matters)[[0, -1]]
-    kept = slice(max(first - 1, 0), last + 2)
-    return Line(ordered[kept], logs[kept])
+        new |= set(np.clip(outer_ends, -end, end)[at_ends])
+        new -= set(log_densities)
+    first_index, last = np.flatnonzero(matters)[[0, -1]]
+    range_that_matters = slice(max(first_index - 1, 0), last + 2)
+    return Line(ordered[range_that_matters], logs[range_that_matters])

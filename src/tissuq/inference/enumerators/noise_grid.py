@@ -154,13 +154,17 @@ def _refined(
     while len(values) < MAX_VALUES:
         log_noises = np.array(sorted(values))
         logs = np.array([values[log_noise] for log_noise in log_noises])
-        least = logs.max() - NEGLIGIBLE_DROP
-        matters = np.maximum(logs[1:], logs[:-1]) > least
+        smallest_that_matters = logs.max() - NEGLIGIBLE_DROP
+        matters = np.maximum(logs[1:], logs[:-1]) > smallest_that_matters
         is_rough = matters & (np.abs(np.diff(logs)) > MAX_DROP) & (np.diff(log_noises) > MIN_STEP)
         new = list(0.5 * (log_noises[1:] + log_noises[:-1])[is_rough])
         # Below the resolution of the tests, nothing but the prior depends on the noise: it is the end's.
-        new += [log_noises[0] - MAX_STEP] if logs[0] > least and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP else []
-        new += [log_noises[-1] + MAX_STEP] if logs[-1] > least else []
+        new += (
+            [log_noises[0] - MAX_STEP]
+            if logs[0] > smallest_that_matters and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP
+            else []
+        )
+        new += [log_noises[-1] + MAX_STEP] if logs[-1] > smallest_that_matters else []
         new = [float(np.clip(log_noise, *ends)) for log_noise in new]
         if all(log_noise in values for log_noise in new):
             break
@@ -187,11 +191,19 @@ def _widened(
     )
     while len(values) < MAX_VALUES:
         ordered = sorted(values)
-        least, (first, second), last = max(values.values()) - WIDENING_DROP, ordered[:2], ordered[-1]
-        if values[last] > least and last + step <= ends[1]:
+        smallest_that_matters, (lowest, next_lowest), last = (
+            max(values.values()) - WIDENING_DROP,
+            ordered[:2],
+            ordered[-1],
+        )
+        if values[last] > smallest_that_matters and last + step <= ends[1]:
             values[last + step] = function(last + step)
-        elif values[first] > least and first - step >= ends[0] and values[first] - values[second] > -MIN_SLOPE * step:
-            values[first - step] = function(first - step)
+        elif (
+            values[lowest] > smallest_that_matters
+            and lowest - step >= ends[0]
+            and values[lowest] - values[next_lowest] > -MIN_SLOPE * step
+        ):
+            values[lowest - step] = function(lowest - step)
         else:
             break
     ordered = sorted(values)
@@ -203,7 +215,7 @@ def _joined(
 ) -> Solution:
     """Return the posterior from those at values of the logarithm of the noise, and its log density at these."""
     table, density = _table(logs, log_weights)
-    shares, other = _shares(logs, table, density), _shares(logs, *_table(logs, log_weights, is_local=True)).sum()
+    shares, local_mass = _shares(logs, table, density), _shares(logs, *_table(logs, log_weights, is_local=True)).sum()
     total = shares.sum()
     shares = shares / total
 
@@ -231,7 +243,7 @@ def _joined(
         seed,
         log_evidence=float(log_weights.max() + np.log(total)),
         log_evidence_error=float(shares @ [solution.log_evidence_error or 0.0 for solution in solutions])
-        + float(abs(other / total - 1)),
+        + float(abs(local_mass / total - 1)),
         members=members,
     )
 
@@ -260,9 +272,11 @@ def _represented(
     """Return the components of all solutions, fewer of those of less weight."""
     mixtures = []
     for solution, share, log in zip(solutions, shares, logs, strict=True):
-        few = solution.few_components(max(1, int(share * MAX_COMPONENTS)), wide=wide)
-        values = dict(zip(solution.model.nonlinear, few.settings.T, strict=True))
-        values[SYMBOL] = np.full(len(few), np.exp(log))
+        components = solution.few_components(max(1, int(share * MAX_COMPONENTS)), wide=wide)
+        values = dict(zip(solution.model.nonlinear, components.settings.T, strict=True))
+        values[SYMBOL] = np.full(len(components), np.exp(log))
         settings = np.column_stack([values[symbol] for symbol in model.nonlinear])
-        mixtures.append(replace(few, settings=settings, weights=share * few.weights / few.weights.sum()))
+        mixtures.append(
+            replace(components, settings=settings, weights=share * components.weights / components.weights.sum())
+        )
     return GaussianMixture.of_all(mixtures)

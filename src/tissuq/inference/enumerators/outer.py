@@ -245,8 +245,8 @@ class _Search:
         guide.places = line.spread(guide.accuracy)
         self._check_place(line.places[[line.log_masses.argmax()]])
         cells = zip(line.places, np.exp(line.log_masses - line.logs), strict=True)
-        chosen = [replace(nodes[float(place)], place=float(place), width=float(width)) for place, width in cells]
-        return *_weighted(chosen, line.log_masses), line.error
+        line_nodes = [replace(nodes[float(place)], place=float(place), width=float(width)) for place, width in cells]
+        return *_weighted(line_nodes, line.log_masses), line.error
 
     def _peaks(self, guide: Guide) -> FloatArray:
         """Return places about where the material alone fits the data: a posterior may have a narrow peak there."""
@@ -282,10 +282,10 @@ class _Search:
 
         count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
         min_effective = guide.accuracy.min_effective
-        found = adapted(log_masses, d, count, start=start, min_effective=min_effective)
-        guide.proposal = found.proposal
-        error = relative_error(self._outer, found.log_weights, min_effective)
-        return *_weighted(nodes, found.log_weights - np.log(len(nodes))), error
+        adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
+        guide.proposal = adaptation.proposal
+        error = relative_error(self._outer, adaptation.log_weights, min_effective)
+        return *_weighted(nodes, adaptation.log_weights - np.log(len(nodes))), error
 
     def _scouted(self, point: FloatArray) -> float:
         """Return the logarithm of the density at a point (d,), roughly: from a few of the members."""
@@ -314,9 +314,9 @@ class _Search:
 
 def _weighted(nodes: Sequence[Node], log_masses: FloatArray) -> tuple[list[Node], FloatArray]:
     """Return nodes with a mass at all, and log weights that give them these masses (K,)."""
-    own = np.array([node.log_mass for node in nodes])
-    numbers = np.flatnonzero(np.isfinite(own))
-    return [nodes[int(number)] for number in numbers], (log_masses - own)[numbers]
+    node_masses = np.array([node.log_mass for node in nodes])
+    numbers = np.flatnonzero(np.isfinite(node_masses))
+    return [nodes[int(number)] for number in numbers], (log_masses - node_masses)[numbers]
 
 
 class _Terms:
