@@ -23,6 +23,7 @@ from tissuq.population.likelihoods import Coordinates
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.population.sample_size import needed_table
+from tissuq.population.shared_error import shared_covariance, width_table
 from tissuq.population.warnings import MIN_EFFECTIVE_SHARE, warnings_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
@@ -60,6 +61,8 @@ class Population:
     patient_covariates : dict of str to object
         What is known of the new patient; the other covariates are at the mean of the specimens (numbers) or at the
         reference level (words), as they are for the median of the population.
+    shared_discrepancy : bool
+        Whether the draws have the bias of a discrepancy that all specimens share.
     """
 
     def __init__(
@@ -72,12 +75,12 @@ class Population:
         seed: int,
         covariates: Covariates | None = None,
         patient_covariates: Mapping[str, Any] = MappingProxyType({}),
+        shared_discrepancy: bool = False,
     ) -> None:
         self.posteriors, self.complete = dict(posteriors), complete
-        self.coordinates, self.hierarchy = coordinates, hierarchy
-        self.spread_prior, self.seed = spread_prior, seed
+        self.coordinates, self.hierarchy, self.spread_prior, self.seed = coordinates, hierarchy, spread_prior, seed
         self.covariates = covariates or covariates_of(None, tuple(posteriors))
-        self.patient_covariates = dict(patient_covariates)
+        self.patient_covariates, self.shared_discrepancy = dict(patient_covariates), shared_discrepancy
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -105,6 +108,11 @@ class Population:
         return self.coordinates.from_line(self.hierarchy.specimens)
 
     @cached_property
+    def shared_covariance(self) -> FloatArray:
+        """The covariance (d, d), on the line, of the bias of all if the specimens share their discrepancy."""
+        return shared_covariance(list(self.posteriors.values()), self.coordinates)
+
+    @cached_property
     def new(self) -> FloatArray:
         """Draws (chains, draws, d) of a new patient's parameters."""
         columns = self.covariates.row(self.patient_covariates)
@@ -120,7 +128,7 @@ class Population:
         """
         self.covariates.row(covariates)
         parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.spread_prior, self.seed
-        return Population(*parts, self.covariates, covariates)
+        return Population(*parts, self.covariates, covariates, self.shared_discrepancy)
 
     @cached_property
     def patient(self) -> Posterior:
@@ -255,6 +263,13 @@ class Population:
         check_probability(prob)
         return effect_table(self, prob, self.unit(unit))
 
+    def median_half_widths(self, prob: float = 0.95) -> pd.DataFrame:
+        """Return half the width of the interval of the population's median, over the median, for every parameter.
+
+        Columns ``independent`` (specimens' discrepancies are) and ``shared`` (all have the same); equal without one.
+        """
+        return width_table(self, prob)
+
     def specimens_needed(self, aim: float, prob: float = 0.95, assurance: float = 0.8) -> pd.DataFrame:
         """Return how many specimens like these it takes until intervals are as narrow as is aimed at.
 
@@ -372,6 +387,7 @@ class Population:
             "seed": self.seed,
             "converged": str(self.converged),
         }
+        labels |= {"shared_discrepancy": "True"} if self.shared_discrepancy else {}
         parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new
         return labelled(*parts, labels, self.covariates)
 
