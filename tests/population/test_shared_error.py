@@ -185,8 +185,8 @@ def test_the_bias_is_that_of_median_specimens_and_new_patient_in_the_same_draw(f
 def test_the_page_says_how_wide_the_interval_would_be_otherwise(found, apart):
     widths = apart.median_half_widths().loc["C10"]
     independent, shared = (f"{100 * width:.2g} %" for width in widths)
-    assert f"C10 {independent}, but {shared} if the model error is the same in all specimens" in _note(apart)
-    assert f"C10 {shared}, but {independent} if it is independent." in _note(found)
+    assert f"C10 {independent} ({shared}); in brackets if the model error is the same in all specimens" in _note(apart)
+    assert f"C10 {shared} ({independent}); in brackets if it is independent." in _note(found)
     assert found.data.attrs["shared_discrepancy"] == "True"
     assert "shared_discrepancy" not in apart.data.attrs
     assert found.given({}).shared_discrepancy

@@ -193,8 +193,9 @@ def _note(population: Population) -> str:
     words = ["if the model error is the same in all specimens (--shared-discrepancy)", "if it is independent"]
     first, second = ("shared", "independent") if is_shared else ("independent", "shared")
     widths = population.median_half_widths().to_dict("index")
-    of_each = [f"{symbol} {_share(row[first])}, but {_share(row[second])}" for symbol, row in widths.items()]
-    return f"{NO_RANGE} Half the 95 % interval of the median over the median: {'; '.join(of_each)} {words[is_shared]}."
+    of_each = ", ".join(f"{symbol} {_share(row[first])} ({_share(row[second])})" for symbol, row in widths.items())
+    words_of_all = f"{of_each}; in brackets {words[is_shared]}"
+    return f"{NO_RANGE} Half the 95 % interval of the median over the median: {words_of_all}."
 
 
 def _share(half_width: float) -> str:
