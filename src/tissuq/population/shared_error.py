@@ -41,6 +41,8 @@ FloatArray = NDArray[np.float64]
 
 COMPONENTS, BENT_COMPONENTS = 200, 32
 """Components of a posterior over which covariances given the discrepancy are averaged; of a law with exponents."""
+ROUNDING = 1e-12
+"""Of correlations, so that those of one are no obstacle."""
 RELATIVE_STEP = 1e-4
 """Of an exponent, for the slope of the stress."""
 
@@ -83,12 +85,19 @@ def _due_to_discrepancy(solution: Solution, coordinates: Coordinates) -> FloatAr
         return np.zeros((len(coordinates.symbols), len(coordinates.symbols)))
     mean, root = values_of(model, solution.mixture, coordinates.symbols)
     of_all = GaussianMixture(solution.mixture.weights, np.zeros((len(mean), 0)), mean, root)
-    total, on_the_line = (np.linalg.cholesky(each.moments()[1]) for each in (of_all, on_line(solution, coordinates)))
+    total, on_the_line = (_root(each.moments()[1]) for each in (of_all, on_line(solution, coordinates)))
     inverse = np.linalg.inv(total)
     given = inverse @ _given_discrepancy(model, solution.mixture, coordinates.symbols) @ inverse.T
     values, vectors = np.linalg.eigh(np.eye(len(given)) - given)
     sides = on_the_line @ vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(sides @ sides.T)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Return a triangle whose square is a covariance, which may be singular."""
+    sides = np.sqrt(np.diag(covariance)) + 1e-300
+    correlation = covariance / np.outer(sides, sides) + ROUNDING * np.eye(len(sides))
+    return np.asarray(sides[:, None] * np.linalg.cholesky(correlation))
 
 
 def _given_discrepancy(model: StatisticalModel, mixture: GaussianMixture, symbols: Sequence[str]) -> FloatArray:
@@ -109,7 +118,8 @@ def _given_discrepancy(model: StatisticalModel, mixture: GaussianMixture, symbol
         precision = slopes.T @ (slopes / variance[index][:, None]) + prior_precision
         size = 1 / np.sqrt(np.diag(precision))
         covariance[index] = np.linalg.inv(precision * size[:, None] * size) * size[:, None] * size
-    mean = np.einsum("m,mij->ij", components.weights, covariance)
+    is_known = np.isfinite(covariance).all(axis=(1, 2))  # not at a stretch at which the material locks
+    mean = np.average(covariance[is_known], axis=0, weights=components.weights[is_known])
     return np.asarray(mean[np.ix_(parameters, parameters)])
 
 
