@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.headed_tables import headed
 from tissuq.experiments.units import StressUnit
+from tissuq.population.draws import PopulationDraws
 from tissuq.population.intervals import INTERVAL_COLUMNS, interval
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from tissuq.population.population import Population
 
 __all__ = ["ALL_COVARIATES", "effect_table", "explained_share"]
 
@@ -24,7 +23,7 @@ ALL_COVARIATES = "all covariates"
 """In place of a covariate, of the share that they explain together."""
 
 
-def explained_share(population: Population) -> FloatArray:
+def explained_share(population: PopulationDraws) -> FloatArray:
     """Return draws (chains, draws, d) of the share of the variance between specimens that covariates explain.
 
     It is that of B x_i over the specimens, over its sum with tau squared (Gelman & Pardoe 2006).
@@ -34,7 +33,7 @@ def explained_share(population: Population) -> FloatArray:
     return np.asarray(explained / (explained + hierarchy.tau**2))
 
 
-def effect_table(population: Population, prob: float, unit: StressUnit) -> pd.DataFrame:
+def effect_table(population: PopulationDraws, prob: float, unit: StressUnit) -> pd.DataFrame:
     """Return `Population.effects`, differences of stresses in a unit."""
     import pandas as pd
 

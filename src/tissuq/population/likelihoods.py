@@ -23,7 +23,7 @@ from tissuq.inference.solution import Solution
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.moments import values_of
 
-__all__ = ["Coordinates", "Likelihoods", "coordinates_of", "likelihoods_of", "mixtures_of", "reduced"]
+__all__ = ["Coordinates", "Likelihoods", "coordinates_of", "likelihoods_of", "mixtures_of", "on_line", "reduced"]
 
 FloatArray = NDArray[np.float64]
 
@@ -132,7 +132,8 @@ class Likelihoods:
 
 def mixtures_of(posteriors: Sequence[Posterior], coordinates: Coordinates) -> tuple[list[GaussianMixture], FloatArray]:
     """Return every specimen's posterior on the line with a reference for its prior, and the reference's sd (d,)."""
-    mixtures = [_on_line(posterior.solution, coordinates) for posterior in posteriors]
+    solutions = [posterior.solution for posterior in posteriors]
+    mixtures = [_with_common_error(on_line(each, coordinates), each, coordinates) for each in solutions]
     between = np.std([mixture.moments()[0] for mixture in mixtures], axis=0)
     reference = np.hypot(MIN_REFERENCE_SD, REFERENCE_SD_RATIO * between)
     return [_under(reference, *mixture, coordinates) for mixture in zip(mixtures, posteriors, strict=True)], reference
@@ -157,8 +158,8 @@ def likelihoods_of(mixtures: Sequence[GaussianMixture], reference: FloatArray, m
     return Likelihoods(log_factor, pull, precision)
 
 
-def _on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
-    """Return the posterior of one specimen as Gaussians on the line."""
+def on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
+    """Return the posterior of one specimen as Gaussians on the line, without what errors of stress have in common."""
     mean, root = values_of(solution.model, solution.mixture, coordinates.symbols)
     mixture = GaussianMixture.of_covariances(solution.mixture.weights, mean, root @ root.swapaxes(1, 2))
     sd = np.linalg.norm(root, axis=2)
@@ -169,7 +170,7 @@ def _on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
         pieces.append(_split(reduced(mixture[~is_narrow & ~is_point], MAX_WIDE_COMPONENTS), coordinates))
     if is_point.any():
         pieces.append(_smoothed(mixture[is_point], coordinates))
-    return _with_common_error(GaussianMixture.of_all(pieces), solution, coordinates)
+    return GaussianMixture.of_all(pieces)
 
 
 def _with_common_error(mixture: GaussianMixture, solution: Solution, coordinates: Coordinates) -> GaussianMixture:

@@ -12,13 +12,14 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, material_named
-from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.discrepancy import Discrepancy, NoDiscrepancy, discrepancy_named
 from tissuq.model.noise import Noise
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances
 from tissuq.parameters.priors import Prior
 from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population
+from tissuq.population.shared_error import biased, shared_covariance
 from tissuq.posterior.fitting import fit_many
 from tissuq.posterior.solver import Method
 
@@ -36,6 +37,7 @@ def fit_population(
     parameters: Sequence[str] | None = None,
     spread: float = 1.0,
     covariates: Any = None,
+    shared_discrepancy: bool = False,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
     noise_sd: float | Literal["unknown"] | None = None,
@@ -67,6 +69,10 @@ def fit_population(
         What is known of every specimen (the index of a table) by the names of covariates: numbers such as an age, words
         such as a sex. The middle of the population then depends on them linearly: the logarithm of a positive
         parameter. A name may end in a unit in brackets, such as ``age [year]``.
+    shared_discrepancy : bool
+        Take the model error to be the same in all specimens (the same missing physics), instead of independent: the
+        part of the specimens' covariance that is due to their discrepancy is then a bias that median, specimens and a
+        new patient have in common, and that does not average out.
     discrepancy, material, noise_sd, noise, priors, method, seed
         As for `tissuq.fit`, for every separate fit. Priors of pooled parameters only serve that step: they are
         divided out, and must be wide.
@@ -80,7 +86,7 @@ def fit_population(
     ------
     InputError
         When there are fewer than three specimens, a test is no experiment, there is no such parameter, or covariates
-        cannot be used: missing, constant, determined by others, or too many.
+        cannot be used: missing, constant, determined by others, or too many; or there is no discrepancy to share.
     ModelError, ConvergenceError
         When a specimen cannot be fitted.
 
@@ -111,6 +117,11 @@ def fit_population(
     symbols = _pooled_symbols(parameters, pooled_material)
     if not (np.isfinite(spread) and spread > 0):
         raise InputError(f"spread must be a positive number, not {spread!r}.")
+    if shared_discrepancy and isinstance(discrepancy_named(discrepancy), NoDiscrepancy):
+        raise InputError(
+            "a shared discrepancy needs specimens that are fitted with one: choose a discrepancy such as 'auto', or "
+            "leave out that it is shared."
+        )
     known = covariates_of(covariates, list(specimens))
     of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
     if of_tests.estimand == TISSUE:
@@ -137,7 +148,11 @@ def fit_population(
     coordinates = coordinates_of(single, symbols)
     mixtures, reference = mixtures_of(single, coordinates)
     hierarchy = sample_hierarchy(mixtures, reference, symbols, known, spread, seed)
-    return Population(dict(zip(specimens, single, strict=True)), complete, coordinates, hierarchy, spread, seed, known)
+    covariance = shared_covariance(single, coordinates) if shared_discrepancy else None
+    if covariance is not None:
+        hierarchy = biased(hierarchy, covariance, seed)
+    by_name = dict(zip(specimens, single, strict=True))
+    return Population(by_name, complete, coordinates, hierarchy, spread, seed, known, shared_covariance=covariance)
 
 
 def _by_specimen(

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.drawing.panels import Panels, panels
 from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.population.covariates import Covariates, covariates_of
+from tissuq.experiments.units import StressUnit
+from tissuq.population.draws import PopulationDraws
 from tissuq.population.effects import effect_table
 from tissuq.population.intervals import INTERVAL_COLUMNS, check_probability, interval
-from tissuq.population.likelihoods import Coordinates
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.population.sample_size import needed_table
+from tissuq.population.shared_error import shared_covariance, width_table
 from tissuq.population.warnings import MIN_EFFECTIVE_SHARE, warnings_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
@@ -32,83 +31,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tissuq.inference.enumerators.nuts import NutsDraws
-    from tissuq.population.hierarchy import Hierarchy
 
 __all__ = ["Population"]
 
 FloatArray = NDArray[np.float64]
 
 
-class Population:
+class Population(PopulationDraws):
     """What `tissuq.fit_population` returns: no pooling, partial pooling and complete pooling of the same specimens.
 
-    Attributes
-    ----------
-    posteriors : dict of str to Posterior
-        Separate fit of every specimen: no pooling.
-    complete : Posterior
-        The measurements of all specimens taken as those of one specimen: complete pooling.
-    coordinates : Coordinates
-        The pooled parameters and their form: logarithms of positive ones.
-    hierarchy : Hierarchy
-        Draws of the population and of the specimens within it, in these coordinates: partial pooling.
-    spread_prior : float
-        Sd of the half-normal prior of the spreads on the line.
-    seed : int
-    covariates : Covariates
-        What is known of the specimens beside their tests.
-    patient_covariates : dict of str to object
-        What is known of the new patient; the other covariates are at the mean of the specimens (numbers) or at the
-        reference level (words), as they are for the median of the population.
+    What it is made of, and its draws, are those of `tissuq.population.draws.PopulationDraws`.
     """
-
-    def __init__(
-        self,
-        posteriors: Mapping[str, Posterior],
-        complete: Posterior,
-        coordinates: Coordinates,
-        hierarchy: Hierarchy,
-        spread_prior: float,
-        seed: int,
-        covariates: Covariates | None = None,
-        patient_covariates: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:
-        self.posteriors, self.complete = dict(posteriors), complete
-        self.coordinates, self.hierarchy = coordinates, hierarchy
-        self.spread_prior, self.seed = spread_prior, seed
-        self.covariates = covariates or covariates_of(None, tuple(posteriors))
-        self.patient_covariates = dict(patient_covariates)
-
-    @property
-    def symbols(self) -> tuple[str, ...]:
-        """The pooled parameters."""
-        return self.coordinates.symbols
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The specimens."""
-        return tuple(self.posteriors)
-
-    @property
-    def median(self) -> FloatArray:
-        """Draws (chains, draws, d) of the population's median of every parameter."""
-        return self.coordinates.from_line(self.hierarchy.mean)
-
-    @property
-    def spread(self) -> FloatArray:
-        """Draws (chains, draws, d) of the spread between specimens: sd of the logarithm, or of the parameter itself."""
-        return self.hierarchy.tau * self.coordinates.scale
-
-    @property
-    def specimens(self) -> FloatArray:
-        """Draws (chains, draws, I, d) of every specimen's parameters, given the data of all."""
-        return self.coordinates.from_line(self.hierarchy.specimens)
-
-    @cached_property
-    def new(self) -> FloatArray:
-        """Draws (chains, draws, d) of a new patient's parameters."""
-        columns = self.covariates.row(self.patient_covariates)
-        return self.coordinates.from_line(self.hierarchy.new(np.random.default_rng([self.seed, 5]), columns))
 
     def given(self, covariates: Mapping[str, Any]) -> Population:
         """Return the same population with a new patient of whom covariates are known, such as ``{"age": 60}``.
@@ -120,7 +53,7 @@ class Population:
         """
         self.covariates.row(covariates)
         parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.spread_prior, self.seed
-        return Population(*parts, self.covariates, covariates)
+        return Population(*parts, self.covariates, covariates, self.shared_covariance)
 
     @cached_property
     def patient(self) -> Posterior:
@@ -160,16 +93,6 @@ class Population:
     def warnings(self) -> tuple[str, ...]:
         """Warnings that the user must read, in sentences."""
         return warnings_of(self)
-
-    def unit(self, name: str | None = None) -> StressUnit:
-        """Return the unit of stress of that name, or that of the measurements; MPa where theirs differ."""
-        units = {posterior.unit().name for posterior in self.posteriors.values()}
-        return stress_unit(name or (units.pop() if len(units) == 1 else "MPa"))
-
-    def unit_of(self, symbol: str, unit: StressUnit) -> StressUnit:
-        """Return the unit of a parameter where stresses are in a unit: that one, or none of a plain number."""
-        parameters = self.complete.model.parameters
-        return unit if next(p for p in parameters if p.symbol == symbol).unit else StressUnit("", 1.0)
 
     def summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
         """Return median and interval of every pooled parameter, by partial and by complete pooling.
@@ -254,6 +177,15 @@ class Population:
         """
         check_probability(prob)
         return effect_table(self, prob, self.unit(unit))
+
+    def median_half_widths(self, prob: float = 0.95) -> pd.DataFrame:
+        """Return half the width of the interval of the population's median, over the median, for every parameter.
+
+        Columns ``independent`` (specimens' discrepancies are) and ``shared`` (all have the same); equal without one.
+        """
+        known = self.shared_covariance
+        covariance = shared_covariance(list(self.posteriors.values()), self.coordinates) if known is None else known
+        return width_table(self, covariance, prob)
 
     def specimens_needed(self, aim: float, prob: float = 0.95, assurance: float = 0.8) -> pd.DataFrame:
         """Return how many specimens like these it takes until intervals are as narrow as is aimed at.
@@ -372,6 +304,7 @@ class Population:
             "seed": self.seed,
             "converged": str(self.converged),
         }
+        labels |= {"shared_discrepancy": "True"} if self.shared_covariance is not None else {}
         parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new
         return labelled(*parts, labels, self.covariates)
 

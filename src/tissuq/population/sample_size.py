@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.population.draws import PopulationDraws
 from tissuq.population.hierarchy import EFFECT_PRIOR_SD, MEAN_PRIOR_SD
 from tissuq.population.intervals import check_probability
 from tissuq.population.likelihoods import mixtures_of
@@ -21,9 +22,7 @@ from tissuq.population.likelihoods import mixtures_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tissuq.population.population import Population
-
-__all__ = ["MAX_SPECIMENS", "needed_table"]
+__all__ = ["MAX_SPECIMENS", "needed_table", "relative_width", "score"]
 
 FloatArray = NDArray[np.float64]
 
@@ -59,7 +58,7 @@ class _Specimens:
         return np.column_stack([weights @ per_specimen, 0.5 * np.log(weights).sum(axis=1)])
 
 
-def needed_table(population: Population, aim: float, prob: float, assurance: float) -> pd.DataFrame:
+def needed_table(population: PopulationDraws, aim: float, prob: float, assurance: float) -> pd.DataFrame:
     """Return `Population.specimens_needed`."""
     import pandas as pd
 
@@ -76,11 +75,15 @@ def needed_table(population: Population, aim: float, prob: float, assurance: flo
         precision = np.maximum(1 / variance - 1 / reference[j] ** 2, MIN_PRECISION_RATIO / reference[j] ** 2)
         columns = np.column_stack([np.ones(count), population.covariates.design])
         specimens = _Specimens(mean / variance / precision, 1 / np.sqrt(precision), columns)
-        widths = _relative(population, j, _half_widths(population, j, specimens, sizes, prob))
-        floors = _relative(population, j, _score(prob) * population.hierarchy.tau[..., j].ravel())
+        covariance = population.shared_covariance
+        shared = 0.0 if covariance is None else score(prob) * np.sqrt(covariance[j, j])
+        half_widths = np.hypot(_half_widths(population, j, specimens, sizes, prob), shared)
+        widths = relative_width(population, j, half_widths)
+        tau = population.hierarchy.tau[..., j].ravel()
         for quantity, of_quantity in zip(("median", "new patient"), widths, strict=True):
             likely = np.quantile(of_quantity, assurance, axis=0)
-            floor = float(np.quantile(floors, assurance)) if quantity == "new patient" else 0.0
+            own = score(prob) * tau * (quantity == "new patient")
+            floor = float(np.quantile(relative_width(population, j, np.hypot(own, shared)), assurance))
             needed = _first_below(aim, sizes, likely) if floor < aim else np.nan
             rows[symbol, quantity] = [likely[0], floor, needed, needed - count]
     index = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
@@ -95,7 +98,7 @@ def _sizes(count: int) -> NDArray[np.intp]:
 
 
 def _half_widths(
-    population: Population, j: int, specimens: _Specimens, sizes: NDArray[np.intp], prob: float
+    population: PopulationDraws, j: int, specimens: _Specimens, sizes: NDArray[np.intp], prob: float
 ) -> FloatArray:
     """Return half the widths (2, futures, sizes) of the intervals of the median and of a new patient, on the line."""
     generator = np.random.default_rng([population.seed, 6, j])
@@ -108,7 +111,7 @@ def _half_widths(
     tau = hierarchy.tau[..., j].ravel()
     chosen = generator.choice(len(tau), FUTURES, replace=False)
     effects = hierarchy.effects[..., j].reshape(len(tau), -1)
-    slopes = np.column_stack([hierarchy.mean[..., j].ravel(), effects])[chosen]
+    slopes = np.column_stack([hierarchy.sampled.values[..., j].ravel(), effects])[chosen]
     known = specimens.sums(spreads)
     found = []
     for slope, own_tau in zip(slopes, tau[chosen], strict=True):
@@ -157,14 +160,16 @@ def _half_width(weights: FloatArray, mean: FloatArray, sd: FloatArray, prob: flo
     return np.asarray(0.5 * (ends[1] - ends[0]))
 
 
-def _relative(population: Population, j: int, half_width: FloatArray) -> FloatArray:
+def relative_width(population: PopulationDraws, j: int, half_width: FloatArray) -> FloatArray:
     """Return half widths on the line over the median of a parameter."""
     if population.coordinates.is_log[j]:
         return np.asarray(np.sinh(half_width))
-    return np.asarray(half_width * population.coordinates.scale[j] / np.abs(np.median(population.median[..., j])))
+    own = population.coordinates.from_line(population.hierarchy.sampled.values[..., : len(population.symbols)])
+    return np.asarray(half_width * population.coordinates.scale[j] / np.abs(np.median(own[..., j])))
 
 
-def _score(prob: float) -> float:
+def score(prob: float) -> float:
+    """Return half the width of the interval of a standard Gaussian."""
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + prob / 2))

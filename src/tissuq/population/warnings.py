@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from tissuq.population.population import Population
+from tissuq.population.draws import PopulationDraws
 
 __all__ = ["MIN_EFFECTIVE_SHARE", "warnings_of"]
 
@@ -15,11 +12,11 @@ MIN_SPECIMENS_FOR_SPREAD = 5
 """Smallest number of specimens for which the prior of the spread has little influence."""
 
 
-def warnings_of(population: Population) -> tuple[str, ...]:
+def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
     """Return the warnings, in sentences."""
     sentences = []
-    if not population.diagnostics.converged:
-        sentences.append(population.diagnostics.verdict)
+    if not population.hierarchy.diagnostics.converged:
+        sentences.append(population.hierarchy.diagnostics.verdict)
     if population.hierarchy.effective <= MIN_EFFECTIVE_SHARE:
         sentences.append(
             f"only {population.hierarchy.effective:.0%} of the draws remain effective when they are corrected for the "

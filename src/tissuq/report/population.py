@@ -118,9 +118,9 @@ HOW_TO_READ = (
     "someone who has not been measured.",
     "**Complete pooling** treats all specimens as one. Its interval shrinks with every measurement, however much "
     "patients differ: it understates the uncertainty and is shown for comparison only.",
-    "The specimens' model errors are taken to be independent. An error that all of them share (the same missing "
-    "physics) does not average out and is not included in the interval of the population median; the interval of a new "
-    "patient, which reflects the differences between patients, is hardly affected.",
+    "The specimens' model errors are taken to be independent, unless the discrepancy is shared. An error that all of "
+    "them share (the same missing physics) does not average out: with --shared-discrepancy it is included in the "
+    "intervals of the population median and of a new patient.",
     "The spread of a positive parameter is the sd of its logarithm: 0.3 means that two thirds of patients lie within "
     "about ± 30 % of the median.",
 )
@@ -174,7 +174,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
             "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
         ),
         tables=(
-            Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),
+            Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), _note(population)),
             *effects_of_covariates(study),
             *needed_table_of(study, needed),
         ),
@@ -183,6 +183,24 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         files=files | sources | of_covariates | laws | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update={"files": names, "material": law, **relocated}),
     )  # fmt: skip
+
+
+def _note(population: Population) -> str:
+    """Return what stands beneath the table: what it is no range of, and what a shared discrepancy changes."""
+    if population.shared_covariance is None:
+        return NO_RANGE
+    widths = population.median_half_widths().to_dict("index")
+    of_each = ", ".join(
+        f"{symbol} {_share(row['shared'])} ({_share(row['independent'])})" for symbol, row in widths.items()
+    )
+    return (
+        f"{NO_RANGE} Half the 95 % interval of the median over the median: {of_each}; in brackets if the model "
+        "error is independent."
+    )
+
+
+def _share(half_width: float) -> str:
+    return f"{significant(100 * half_width, 2)} %"
 
 
 def _first_parameter(population: Population, unit: StressUnit) -> Figure:

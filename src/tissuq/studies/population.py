@@ -90,6 +90,7 @@ def run_population(
         parameters=settings.parameters,
         spread=settings.spread,
         covariates=covariates,
+        shared_discrepancy=settings.shared_discrepancy,
         material=law or material_named(settings.material),
         discrepancy=settings.discrepancy,
         noise=settings.noise_in(_unit(tests)),

@@ -81,6 +81,9 @@ class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
         "careful laboratory) [as-tested].",
     )
     discrepancy: str = option("auto", "Discrepancy of every specimen.")
+    shared_discrepancy: bool = option(
+        False, "Take the model error to be the same in all specimens: it does not average out."
+    )
     mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
 
     def sources(self, folder: Path = Path()) -> dict[str, list[Path]]:

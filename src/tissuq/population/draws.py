@@ -1,0 +1,108 @@
+"""The draws of a population, and what they are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.population.covariates import Covariates, covariates_of
+from tissuq.population.likelihoods import Coordinates
+from tissuq.posterior.posterior import Posterior
+
+if TYPE_CHECKING:
+    from tissuq.population.hierarchy import Hierarchy
+
+__all__ = ["PopulationDraws"]
+
+FloatArray = NDArray[np.float64]
+
+
+class PopulationDraws:
+    """Separate fits of specimens, their fit as one specimen, and draws of the population with every specimen in it.
+
+    Attributes
+    ----------
+    posteriors : dict of str to Posterior
+        Separate fit of every specimen: no pooling.
+    complete : Posterior
+        The measurements of all specimens taken as those of one specimen: complete pooling.
+    coordinates : Coordinates
+        The pooled parameters and their form: logarithms of positive ones.
+    hierarchy : Hierarchy
+        Draws of the population and of the specimens within it, in these coordinates: partial pooling.
+    spread_prior : float
+        Sd of the half-normal prior of the spreads on the line.
+    seed : int
+    covariates : Covariates
+        What is known of the specimens beside their tests.
+    patient_covariates : dict of str to object
+        What is known of the new patient; the other covariates are at the mean of the specimens (numbers) or at the
+        reference level (words), as they are for the median of the population.
+    shared_covariance : (d, d) array, optional
+        Covariance, on the line, of the bias in the draws by a discrepancy that all specimens share; None where these
+        have their own.
+    """
+
+    def __init__(
+        self,
+        posteriors: Mapping[str, Posterior],
+        complete: Posterior,
+        coordinates: Coordinates,
+        hierarchy: Hierarchy,
+        spread_prior: float,
+        seed: int,
+        covariates: Covariates | None = None,
+        patient_covariates: Mapping[str, Any] = MappingProxyType({}),
+        shared_covariance: FloatArray | None = None,
+    ) -> None:
+        self.posteriors, self.complete = dict(posteriors), complete
+        self.coordinates, self.hierarchy, self.spread_prior, self.seed = coordinates, hierarchy, spread_prior, seed
+        self.covariates = covariates or covariates_of(None, tuple(posteriors))
+        self.patient_covariates, self.shared_covariance = dict(patient_covariates), shared_covariance
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """The pooled parameters."""
+        return self.coordinates.symbols
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The specimens."""
+        return tuple(self.posteriors)
+
+    @property
+    def median(self) -> FloatArray:
+        """Draws (chains, draws, d) of the population's median of every parameter."""
+        return self.coordinates.from_line(self.hierarchy.mean)
+
+    @property
+    def spread(self) -> FloatArray:
+        """Draws (chains, draws, d) of the spread between specimens: sd of the logarithm, or of the parameter itself."""
+        return self.hierarchy.tau * self.coordinates.scale
+
+    @property
+    def specimens(self) -> FloatArray:
+        """Draws (chains, draws, I, d) of every specimen's parameters, given the data of all."""
+        return self.coordinates.from_line(self.hierarchy.specimens)
+
+    @cached_property
+    def new(self) -> FloatArray:
+        """Draws (chains, draws, d) of a new patient's parameters."""
+        columns = self.covariates.row(self.patient_covariates)
+        return self.coordinates.from_line(self.hierarchy.new(np.random.default_rng([self.seed, 5]), columns))
+
+    def unit(self, name: str | None = None) -> StressUnit:
+        """Return the unit of stress of that name, or that of the measurements; MPa where theirs differ."""
+        units = {posterior.unit().name for posterior in self.posteriors.values()}
+        return stress_unit(name or (units.pop() if len(units) == 1 else "MPa"))
+
+    def unit_of(self, symbol: str, unit: StressUnit) -> StressUnit:
+        """Return the unit of a parameter where stresses are in a unit: that one, or none of a plain number."""
+        parameters = self.complete.model.parameters
+        return unit if next(p for p in parameters if p.symbol == symbol).unit else StressUnit("", 1.0)
