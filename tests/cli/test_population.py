@@ -144,6 +144,19 @@ def test_the_numbers_are_those_of_the_specimens(population_run):
     assert float(bands[-1]["median [kPa]"]) == pytest.approx(stress, rel=0.5)
 
 
+def test_specimens_have_noises_of_their_own(here):
+    write_all(here)
+    noises = {f"S{k}": 0.5 * (k + 1) for k in range(5)}
+    settings = PopulationSettings(files=("specimens",), discrepancy="none", noise_sd=noises)
+    found = population.run_population(settings).population
+    known = {name: posterior.model.noise for name, posterior in found.posteriors.items()}
+    assert [known[name].sd({}, 0.0) for name in noises] == pytest.approx([sd / 1000 for sd in noises.values()])
+    assert known["S5"].name == "unknown"
+    drawn = found.patient.solution.mixture.settings[:, 0]  # of a random specimen, five of six of which are known
+    is_known = np.isclose(drawn[:, None], [known[name].sd({}, 0.0) for name in noises], rtol=1e-9).any(axis=1)
+    assert is_known.mean() == pytest.approx(5 / 6, abs=0.02)
+
+
 @pytest.mark.slow
 def test_a_run_is_repeated_from_its_own_folder_and_from_one_file(population_run):
     folder, _ = population_run
@@ -338,8 +351,10 @@ def test_covariates_that_cannot_be_used_end_with_one_message(cli, here, rows, op
         (["specimens", "--tolerance", "stress=much"], "is not a tolerance"),
         (["specimens", "--parameter", "C99"], "found: C99"),
         (["specimens", "--spread", "-1"], "spread"),
-        (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),
-        (["specimens", "--noise-sd", "1,2"], "give it once for all specimens"),
+        (["specimens", "--noise-sd", "much"], "--noise-sd must be a number"),
+        (["specimens", "--noise-sd", "1,2"], "--noise-sd must be a number"),
+        (["specimens", "--noise-sd", "S0=1,S9=2"], "there is a noise of S9, but the specimens are S0, S1"),
+        (["specimens", "--noise-sd", "S0=0"], "must be a positive number in the file's stress unit"),
         (["specimens", "--mode", "biaxial"], "loading mode 'biaxial' has engineering stress of axis 1"),
     ],
 )

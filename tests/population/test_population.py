@@ -34,15 +34,18 @@ def found():
 
 
 def by_quadrature(specimens, noise_sd, spread):
-    """Return mean and sd of m, tau and each theta by sums over grids: least squares, and nothing of tissuq's."""
+    """Return mean and sd of m, tau and each theta by sums over grids: least squares, and nothing of tissuq's.
+
+    The noise is the same for all specimens, or that of each of them.
+    """
     basis = 2 * (STRETCH - STRETCH**-2)
     estimates = np.array([basis @ each.stress / (basis @ basis) for each in specimens.values()])
-    sd = noise_sd / np.sqrt(basis @ basis)
+    sd = np.broadcast_to(noise_sd, len(estimates)) / np.sqrt(basis @ basis)
     middle = np.median(np.log(truncnorm(-estimates / sd, np.inf, estimates, sd).median()))
     m, tau = middle + np.linspace(-4, 4, 81), np.exp(np.linspace(np.log(1e-3), np.log(5), 40))
     score = np.linspace(-7, 7, 241)
     theta = m[:, None, None] + tau[:, None] * score
-    log_terms = norm.logpdf(score) + norm.logpdf(estimates[:, None, None, None], np.exp(theta), sd)
+    log_terms = norm.logpdf(score) + norm.logpdf(estimates[:, None, None, None], np.exp(theta), sd[:, None, None, None])
     log_total = logsumexp(log_terms, axis=3)
     shares = np.exp(log_terms - log_total[..., None])
     first, second = (np.einsum("ijks,jks->ijk", shares, each) for each in (theta, theta**2))
@@ -72,6 +75,49 @@ def test_one_parameter_agrees_with_quadrature(found, noise_sd):
         assert abs(each.std() / scale - 1) < 0.15
     assert own.converged
     assert own.hierarchy.effective > 0.9
+
+
+NOISES = dict(zip(["s0", "s1", "s2", "s3", "s4", "s5"], [0.02, 0.3, 0.05, 0.1, 0.02, 0.2], strict=True))
+
+
+@pytest.fixture(scope="module")
+def of_several_noises():
+    specimens = {}
+    for place, (name, sd) in enumerate(NOISES.items()):
+        specimens[name] = tq.simulate("neo-hookean", {"C10": MODULI[place]}, STRETCH, noise_sd=sd, seed=place)
+    return specimens, neo_hookean(specimens, NOISES)
+
+
+def test_every_specimen_may_have_a_noise_of_its_own(of_several_noises):
+    """As above; complete pooling is weighted least squares."""
+    specimens, own = of_several_noises
+    mean, sd = by_quadrature(specimens, np.array(list(NOISES.values())), 1.0)
+    line = own.coordinates.centre[0]
+    draws = [own.hierarchy.mean[..., 0] + line, own.hierarchy.tau[..., 0]]
+    draws += [own.hierarchy.specimens[..., place, 0] + line for place in range(len(MODULI))]
+    for of_quantity, expected, scale in zip(draws, mean, sd, strict=True):
+        assert abs(of_quantity.mean() - expected) < 4 * scale / np.sqrt(1000)
+        assert abs(of_quantity.std() / scale - 1) < 0.15
+    basis, precision = 2 * (STRETCH - STRETCH**-2), np.array(list(NOISES.values())) ** -2.0
+    estimates = np.array([basis @ specimen.stress / (basis @ basis) for specimen in specimens.values()])
+    pooled = own.complete.marginals["C10"]
+    assert pooled.mean == pytest.approx(precision @ estimates / precision.sum(), rel=1e-6)
+    assert pooled.sd == pytest.approx(1 / np.sqrt(precision.sum() * (basis @ basis)), rel=1e-6)
+
+
+def test_tests_of_one_specimen_may_have_noises_of_their_own_and_others_unknown_ones(of_several_noises):
+    specimens, _ = of_several_noises
+    tests = specimens | {"s0": [specimens["s0"], specimens["s1"]]}
+    found = neo_hookean(tests, {"s0": [0.02, 0.3], "s2": 0.05})
+    basis, precision = 2 * (STRETCH - STRETCH**-2), np.array([0.02, 0.3]) ** -2.0
+    assert found.posteriors["s0"].marginals["C10"].sd == pytest.approx(1 / np.sqrt(precision.sum() * (basis @ basis)))
+    names = {name: posterior.model.noise.name for name, posterior in found.posteriors.items()}
+    assert names["s2"] == "known"
+    assert names["s3"] == found.complete.model.noise.name == "unknown"
+    with pytest.raises(tq.InputError, match=r"there is a noise of s9, but the specimens are s0, s1"):
+        neo_hookean(specimens, {"s9": 0.1})
+    with pytest.raises(tq.InputError):
+        neo_hookean(specimens, {"s1": [0.1, 0.2]})
 
 
 def test_complete_pooling_is_the_fit_of_all_measurements_together(found):

@@ -84,7 +84,10 @@ def patient_posterior(
     for i, posterior in enumerate(posteriors):
         rows = np.arange(i, chains * draws, count)
         matching = matching_draws(posterior, coordinates, on_line[rows, i])
-        values[rows], _ = values_of(posterior.model, matching, model.symbols)
+        unknown = [symbol for symbol in model.symbols if symbol in posterior.model.symbols]  # all, but a known noise
+        values[rows] = posterior.model.noise_of_tests[1]
+        columns_of_specimen = [model.symbols.index(symbol) for symbol in unknown]
+        values[rows[:, None], columns_of_specimen], _ = values_of(posterior.model, matching, unknown)
     values[:, [model.symbols.index(symbol) for symbol in coordinates.symbols]] = new.reshape(-1, size)
     columns = dict(zip(model.symbols, values.T, strict=True))
     settings, linear = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population
 from tissuq.population.shared_error import biased, shared_covariance
 from tissuq.posterior.fitting import fit_many
+from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Method
 
 __all__ = ["MIN_SPECIMENS", "fit_population"]
@@ -40,7 +41,7 @@ def fit_population(
     shared_discrepancy: bool = False,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
-    noise_sd: float | Literal["unknown"] | None = None,
+    noise_sd: float | str | Mapping[str, float | str | Sequence[float]] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
     tolerances: Tolerances | str | None = None,
@@ -73,7 +74,10 @@ def fit_population(
         Take the model error to be the same in all specimens (the same missing physics), instead of independent: the
         part of the specimens' covariance that is due to their discrepancy is then a bias that median, specimens and a
         new patient have in common, and that does not average out.
-    discrepancy, material, noise_sd, noise, priors, method, seed
+    noise_sd : float, str, or mapping of str to float, str or sequence of float, optional
+        As for `tissuq.fit`, for every separate fit; or that of each specimen by its name, of several tests one for all
+        or one for each in their order. The noise of specimens that are left out is unknown.
+    discrepancy, material, noise, priors, method, seed
         As for `tissuq.fit`, for every separate fit. Priors of pooled parameters only serve that step: they are
         divided out, and must be wide.
 
@@ -132,19 +136,22 @@ def fit_population(
     options: dict[str, Any] = {
         "discrepancy": discrepancy,
         "material": pooled_material,
-        "noise_sd": noise_sd,
         "noise": noise,
         "priors": priors,
         "method": method,
         "seed": seed,
     }
-    single = fit_many(
-        [_one_specimen(name, tests, apart=bool(of_tests)) for name, tests in specimens.items()],
-        tolerances=of_tests,
-        **options,
-    )
     all_tests = [test for tests in specimens.values() for test in tests]
-    (complete,) = fit_many([_one_specimen(ALL_SPECIMENS, all_tests)], tolerances=AS_TESTED, **options)
+    noise_of = _noise_of_specimens(noise_sd, specimens)
+    fits: dict[str, Posterior] = {}
+    for sd in dict.fromkeys(noise_of.values()):
+        alike = [name for name in specimens if noise_of[name] == sd]
+        joined = [_one_specimen(name, specimens[name], apart=bool(of_tests) or isinstance(sd, tuple)) for name in alike]
+        fits |= zip(alike, fit_many(joined, noise_sd=sd, tolerances=of_tests, **options), strict=True)
+    single = [fits[name] for name in specimens]
+    of_all = _noise_of_all(noise_of, specimens) if isinstance(noise_sd, Mapping) else noise_sd
+    together = _one_specimen(ALL_SPECIMENS, all_tests, apart=isinstance(of_all, list))
+    (complete,) = fit_many([together], noise_sd=of_all, tolerances=AS_TESTED, **options)
     coordinates = coordinates_of(single, symbols)
     mixtures, reference = mixtures_of(single, coordinates)
     hierarchy = sample_hierarchy(mixtures, reference, symbols, known, spread, seed)
@@ -173,6 +180,23 @@ def _by_specimen(
             "experiments. For a single specimen use tissuq.fit."
         )
     return tests_of
+
+
+def _noise_of_specimens(noise_sd: Any, specimens: Mapping[str, Sequence[Experiment]]) -> dict[str, Any]:
+    """Return the noise of every specimen; a tuple where each of its tests has its own."""
+    if not isinstance(noise_sd, Mapping):
+        return dict.fromkeys(specimens, noise_sd)
+    if foreign := [str(name) for name in noise_sd if name not in specimens]:
+        raise InputError(f"there is a noise of {', '.join(foreign)}, but the specimens are {', '.join(specimens)}.")
+    sds = {name: noise_sd.get(name, "unknown") for name in specimens}
+    return {name: sd if isinstance(sd, str | float | int) else tuple(sd) for name, sd in sds.items()}
+
+
+def _noise_of_all(noise_of: Mapping[str, Any], specimens: Mapping[str, Sequence[Experiment]]) -> list[Any] | str:
+    """Return the noise of all tests, each with its own; unknown where one is."""
+    sds = [sd if isinstance(sd, tuple) else (sd,) * len(specimens[name]) for name, sd in noise_of.items()]
+    of_tests = [sd for of_specimen in sds for sd in of_specimen]
+    return "unknown" if "unknown" in of_tests else of_tests
 
 
 def _one_specimen(name: str, tests: Sequence[Experiment], *, apart: bool = False) -> Experiment:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["needed_of", "needed_table_of"]
 
-HEADERS = ["parameter", "quantity", "now", "at best", "specimens in all", "more"]
+HEADERS = ["parameter", "quantity", "now", "with any number", "specimens in all", "more"]
 QUANTITIES = {"median": "median of the population", "new patient": "a new patient"}
 
 
@@ -39,7 +39,8 @@ def needed_table_of(study: PopulationStudy, needed: pd.DataFrame | None) -> tupl
     return (
         Table(
             HEADERS, rows, f"Specimens like these for ± {percent(aim)} (95 %)", (1, 4),
-            "Half the interval over the median. With so many specimens four of five populations reach the aim. The "
-            "interval of a new patient cannot be narrower than patients differ (at best: with any number).",
+            "Half the interval over the median. With so many specimens four of five populations reach the aim. However "
+            "many there are, patients differ as much as they do. By how much is not known well from few specimens, so "
+            "that the interval of a new patient with any number, which holds in four of five, may be wider than now.",
         ),
     )  # fmt: skip

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, cast
 from pydantic import Field, field_validator, model_validator
 
 from tissuq.studies.option import Settings, option
-from tissuq.studies.option_texts import column, one_noise, pairs_of, range_of
+from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown
 from tissuq.studies.settings import positive_or_unknown
 from tissuq.studies.shared_options import seed
 
@@ -154,8 +154,12 @@ class FittedSettings(Settings):
     """What is fitted; the noise is in the files' unit of stress."""
 
     material: str = option("neo-hookean", "Material, as for tissuq fit [neo-hookean]; see tissuq materials.")
-    noise_sd: float | Literal["unknown"] = option(
-        "unknown", "Sd of the noise, in the files' stress unit, or unknown.", takes=str, parse=one_noise
+    noise_sd: float | Literal["unknown"] | dict[str, float | Literal["unknown"]] = option(
+        "unknown",
+        "Sd of the noise, in the files' stress unit, or unknown; or of each specimen, such as a=0.1,b=0.2 (of others "
+        "unknown).",
+        takes=str,
+        parse=sd_or_unknown,
     )
     noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
         None, "Instead: unknown, proportional, repeats or another one, as for tissuq fit."
@@ -168,9 +172,9 @@ class FittedSettings(Settings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        return positive_or_unknown(
-            value, "the file's stress unit", "; noise of zero would make every measurement exact"
-        )
+        for sd in value.values() if isinstance(value, dict) else [value]:
+            positive_or_unknown(sd, "the file's stress unit", "; noise of zero would make every measurement exact")
+        return value
 
     @model_validator(mode="after")
     def _one_noise(self) -> Self:
@@ -179,9 +183,9 @@ class FittedSettings(Settings):
         return self
 
     def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise, a known standard deviation converted from a unit to MPa."""
+        """Return the noise of all, a known standard deviation converted from a unit to MPa."""
         from tissuq.model.noise import noise_named
 
-        if self.noise_sd == "unknown":
-            return noise_named(self.noise or "unknown")
-        return noise_named(self.noise_sd * unit.to_mpa)
+        if isinstance(self.noise_sd, float):
+            return noise_named(self.noise_sd * unit.to_mpa)
+        return noise_named(self.noise or "unknown")

@@ -10,7 +10,7 @@ from typing import Any
 from tissuq.errors import InputError
 
 __all__ = [
-    "column", "noises", "number_or_text", "once_each", "one_noise", "pairs_of", "priors", "range_of", "sd_or_unknown",
+    "column", "noises", "number_or_text", "once_each", "pairs_of", "priors", "range_of", "sd_or_unknown",
     "share", "tolerances",
 ]  # fmt: skip
 
@@ -83,14 +83,6 @@ def noises(text: str) -> list[float | str]:
             f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'. For several files, one "
             "for each with commas."
         ) from error
-
-
-def one_noise(text: str) -> float | str:
-    """Return the standard deviation of the noise of all files: a number, or 'unknown'."""
-    values = noises(text)
-    if len(values) > 1:
-        raise InputError(f"--noise-sd is given {len(values)} times for a population; give it once for all specimens.")
-    return values[0]
 
 
 def share(option: str) -> Callable[[str], float]:

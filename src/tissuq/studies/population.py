@@ -83,6 +83,7 @@ def run_population(
     known = settings.covariate_table(tests, folder)
     covariates = covariates_of(known.values() if known else None, list(tests), known.place if known else None)
     covariates.row(settings.new_patient)  # raises where there is no such patient, before specimens are fitted
+    noise_sd = settings.noise_sd if isinstance(settings.noise_sd, dict) else {}
     step(f"{len(tests)} specimens")
     start = perf_counter()
     population = fit_population(
@@ -93,7 +94,9 @@ def run_population(
         shared_discrepancy=settings.shared_discrepancy,
         material=law or material_named(settings.material),
         discrepancy=settings.discrepancy,
-        noise=settings.noise_in(_unit(tests)),
+        noise=None if noise_sd else settings.noise_in(_unit(tests)),
+        noise_sd={name: f"{sd} {_unit(tests).name}" if sd != "unknown" else sd for name, sd in noise_sd.items()}
+        or None,
         tolerances=settings.tolerances_in(_unit(tests)),
         method=cast("Method", settings.method),
         seed=settings.seed,
