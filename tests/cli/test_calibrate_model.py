@@ -104,6 +104,69 @@ def test_several_quantities_of_a_deck_have_a_column_a_unit_and_a_noise_each(cli,
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 
+def two_experiments(folder):
+    """Write files of two tests, the second at other times, and their decks; return mean and sd of C10 together."""
+    second_sd, at = 0.05, np.array([0.2, 0.5, 0.9])
+    forces(folder)
+    first = np.loadtxt(folder / "punch.csv", delimiter=",", skiprows=1)
+    again = TRUTH * at + second_sd * np.random.default_rng(4).standard_normal(len(at))
+    rows = "".join(f"{time:.3f},{force:.6f}\n" for time, force in zip(at, 1e-3 * again, strict=True))
+    (folder / "pull.csv").write_text(f"time,pull (N)\n{rows}")
+    (folder / "pull.inp").write_text((folder / "model.inp").read_text().replace("Tissue", "Other"))
+    weights = np.concatenate([np.full(len(first), NOISE_SD**-2), np.full(len(at), second_sd**-2)])
+    at, values = np.concatenate([TIMES, at]), np.concatenate([first[:, 1], again])
+    return weights * at @ values / (weights * at @ at), (weights * at @ at) ** -0.5
+
+
+TWO = ["--model", "pull.inp", "--replace", "OTHER", "--qoi", "pull=RF2@TOP"]
+
+
+def test_experiments_have_a_file_and_a_model_each(cli, here, words):
+    """Least squares with weights; the file named first is that of the model named first."""
+    mean, sd = two_experiments(here)
+    noises = f"force={NOISE_SD},pull={5e-5}"
+    words = [words[0], "punch.csv", "pull.csv", *(noises if word == NOISE_SD else word for word in words[2:])]
+    said = cli(*words, *WIDE, *TWO)
+    assert said.status == 0, said.err
+    assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
+    assert len(started(here)) == 2 * 8
+    assert [row["quantity"] for row in rows_of(here / "out" / "prediction.csv")] == ["force"] * 7 + ["pull"] * 3
+    page = " ".join((here / "out" / "report.html").read_text(encoding="utf-8").split())
+    assert "of pull.inp got the card of neo-hookean" in page
+    assert "pull (N) of the file is 0.001 times pull (RF2@TOP)" in page
+    repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--out", "again"]
+    said = cli(*repeat, "--command", words[words.index("--command") + 1])
+    assert said.status == 0, said.err
+    assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
+    (here / "stiff").write_text("6.83")
+    said = cli(*words[:-2], *WIDE, *TWO, "--runs", 12, "--out", "failing")
+    assert said.status == 0, said.err
+    errors = {row["error"].partition(";")[0] for row in rows_of(here / "failing" / "forward_runs.csv")}
+    assert errors == {"", "ConvergenceError: model.inp:TISSUE: increment size smaller than minimum"}
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ([], "every file has its model, in the same order: there are 2 files and 1 models"),
+        (["--model", "pull.inp"], "give --qoi for each of 2"),
+        (["--model", "pull.inp", "--qoi", "drop=RF2@TOP"], "no file has a column 'drop' (--qoi drop=...)"),
+        (["--model", "pull.inp", "--qoi", "time=RF2@TOP"], "punch.csv and pull.csv have a column 'time'"),
+        ([*TWO, "--along", "depth=U2@TOP"], "no file has a column 'depth' (--along depth=...)"),
+        ([*TWO, "--replace", "THIRD"], "give --replace once for all models, or for each of the 2"),
+        ([*TWO, "--along", "time=U2@TOP"], "punch.csv and pull.csv have a column 'time'"),
+    ],
+)
+def test_files_and_models_that_do_not_fit_end_with_one_message(cli, here, words, more, message):
+    two_experiments(here)
+    said = cli(words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, "--noise-sd", "unknown", *more)
+    assert said.status == 2
+    assert message in " ".join(said.err.split())
+    assert "Traceback" not in said.err
+    assert not (here / "out").exists()
+    assert started(here) == []
+
+
 def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
     mean, sd = forces(here)
     (here / "stiff").write_text("6.83")  # above which are 4 of 12 stratified runs: as many are left as in other tests

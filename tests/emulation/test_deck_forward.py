@@ -24,7 +24,7 @@ PRIORS = {"mu1": tq.Uniform(0.0008, 0.003), "alpha1": tq.Uniform(-16.0, -3.0)}
 GRID = 11
 
 
-def write_block(path):
+def write_block(path, travel=-0.3):
     """Write a quarter of a block 2 x 2 x 1 mm of eight elements, pressed by 30 % between plates: mm, N, MPa."""
     places = np.linspace(0, 1, 5)
     numbers, lines = {}, ["*NODE, NSET=ALL"]
@@ -54,8 +54,8 @@ def write_block(path):
             [
                 "*HEADING", "Block", *lines, "*MATERIAL, NAME=TISSUE", "*HYPERELASTIC, NEO HOOKE", "0.0005, 2.0",
                 "*SOLID SECTION, ELSET=BLOCK, MATERIAL=TISSUE", "*STEP, NLGEOM, INC=100", "*STATIC",
-                "0.1, 1., 1e-4, 0.1", "*BOUNDARY", "X, 1, 1", "Y, 2, 2", "BASE, 1, 3", "TOP, 1, 2", "TOP, 3, 3, -0.3",
-                "*NODE PRINT, NSET=TOP, TOTALS=ONLY", "RF", "*NODE PRINT, NSET=TOP", "U",
+                "0.1, 1., 1e-4, 0.1", "*BOUNDARY", "X, 1, 1", "Y, 2, 2", "BASE, 1, 3", "TOP, 1, 2",
+                f"TOP, 3, 3, {travel}", "*NODE PRINT, NSET=TOP, TOTALS=ONLY", "RF", "*NODE PRINT, NSET=TOP", "U",
                 "*NODE PRINT, NSET=BULGE", "U", "*END STEP", "",
             ]
         )
@@ -148,6 +148,36 @@ def test_force_and_displacement_of_a_point_together_are_those_on_a_grid_of_runs(
     hold_against_grid(calibration, misfit)
     with pytest.raises(tq.InputError, match="the model gives force, bulge; what was measured is one quantity"):
         tq.calibrate(DEPTH, measured["force"], both, PRIORS)
+
+
+def test_two_models_of_one_tissue_together_are_those_on_a_grid_of_runs(block, found, tmp_path):
+    """The block pressed, and pulled by 20 %: two decks, each with its own curve."""
+    travel = np.linspace(0.04, 0.2, 5)
+    deck = write_block(tmp_path / "pulled.inp", travel=0.2)
+    pulled = replace(block, model=deck, along_factor=1, factor=4, stretch=(0.8, 1.4))
+    controls = {"press": DEPTH, "pull": travel}
+    runs = {}
+    for name, model in (("press", block), ("pull", pulled)):
+        (tmp_path / name).mkdir()
+        runs[name] = model.prepared_in(tmp_path / name)
+
+    def computed(mu, alpha):
+        return {name: model.run({"mu1": mu, "alpha1": alpha}, controls[name]) for name, model in runs.items()}
+
+    exact, generator = computed(0.0015, -5.5), np.random.default_rng(9)
+    measured = {name: exact[name] + NOISE_SD * generator.standard_normal(len(at)) for name, at in controls.items()}
+    together = {"press": block, "pull": pulled}
+    sds = dict.fromkeys(controls, NOISE_SD)
+    calibration = tq.calibrate(controls, measured, together, SOFT, noise_sd=sds, runs=20, folder=tmp_path / "both")
+
+    def misfit(point):
+        return sum((((curve - measured[name]) / NOISE_SD) ** 2).sum() for name, curve in computed(*point).items())
+
+    hold_against_grid(calibration, misfit)
+    alone = tq.calibrate(DEPTH, measured["press"], block, SOFT, noise_sd=NOISE_SD, runs=20, folder=tmp_path / "alone")
+    assert all(calibration.marginals[symbol].sd < alone.marginals[symbol].sd for symbol in TRUTH)
+    with pytest.raises(tq.InputError, match="the models give press, pull; what was measured is press, neck"):
+        tq.calibrate({"press": DEPTH, "neck": travel}, {"press": DEPTH, "neck": travel}, together, SOFT)
 
 
 def test_the_same_call_goes_on_and_another_model_is_refused(found, block, tmp_path):

@@ -39,16 +39,16 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     from tissuq.report.calibration import calibration_result
     from tissuq.studies.calibration import run_calibration
 
-    call.check_source("file", "a FILE of controls and measured values", "run")
+    call.check_source("files", "a FILE of controls and measured values", "run")
     if not (call.config or "priors" in call.stated or "prior_run" in call.stated):
         raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5), or --prior-run.")
     settings = call.loaded(rivals=("forward", "umbridge"))
     _check_named_again(call, settings)
-    target = call.target(Path("runs") / Path(settings.file).stem)
+    target = call.target(Path("runs") / Path(settings.files[0]).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
     how, running = call.how, dict[str, Any]()
     workers = how.workers
-    if settings.model is not None:
+    if settings.models:
         workers = how.max_jobs or os.cpu_count() or 1
         running = {"timeout": how.timeout, "retries": how.retries, "keep": how.keep, "abaqus": how.abaqus}
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
@@ -70,5 +70,5 @@ def _check_named_again(call: Call[CalibrationSettings, CalibrateOptions], settin
             f"{call.config} names the UM-Bridge server {settings.umbridge}, which is asked only when you name it: add "
             f"--umbridge {settings.umbridge}"
         )
-    if call.config and settings.model:
+    if call.config and settings.models:
         check_named_again(call.config, settings, call.stated, {"quantities": "--qoi", "along": "--along"})

@@ -3,7 +3,7 @@
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.deck_forward import DeckForward
 from tissuq.emulation.emulator import Emulator, emulate
-from tissuq.emulation.forward import FileForward, Forward, UmbridgeForward
+from tissuq.emulation.forward import FileForward, Forward, SeveralModels, UmbridgeForward
 from tissuq.emulation.runs import ForwardRuns, gathered
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "FileForward",
     "Forward",
     "ForwardRuns",
+    "SeveralModels",
     "UmbridgeForward",
     "emulate",
     "gathered",

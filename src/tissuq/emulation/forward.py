@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.errors import InputError
+from tissuq.errors import ConvergenceError, InputError
 from tissuq.mechanics.user_law import LAW, failures_of, run_file
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "CallableForward",
     "FileForward",
     "Forward",
+    "SeveralModels",
     "UmbridgeForward",
     "UnreadableError",
     "as_forward",
@@ -154,16 +155,72 @@ class SeveralQuantities(Forward):
         return replace(self, model=self.model.prepared_in(folder))
 
 
-def as_forward(forward: Forward | Callable[..., Any]) -> Forward:
-    """Return a model for a function; a model is returned as it is.
+@dataclass(frozen=True)
+class SeveralModels(Forward):
+    """Models of several experiments, which share their parameters: each gives some of what was measured.
+
+    Parameters
+    ----------
+    models : tuple of (tuple of str, Forward)
+        Each with the names of what it gives.
+    """
+
+    models: tuple[tuple[tuple[str, ...], Forward], ...]
+
+    def run(self, parameters: Mapping[str, float], control: Any) -> Any:
+        outputs: dict[str, Any] = {}
+        for names, model in self.models:
+            controls = {name: control[name] for name in names}
+            try:
+                if len(names) == 1:
+                    outputs[names[0]] = model.run(parameters, controls[names[0]])
+                else:
+                    outputs |= model.run(parameters, controls)  # type: ignore[arg-type]  # by name
+            except (ConvergenceError, UnreadableError) as error:
+                raise type(error)(f"{model.name}: {error}") from error
+        return outputs
+
+    @property
+    def identity(self) -> str:
+        return "; ".join(f"{model.identity} of {', '.join(names)}" for names, model in self.models)
+
+    @property
+    def name(self) -> str:
+        return " and ".join(model.name for _, model in self.models)
+
+    def of_quantities(self, ends: Mapping[str, tuple[int, int]]) -> Forward:
+        given = [name for names, _ in self.models for name in names]
+        if sorted(given) != sorted(ends):
+            raise InputError(f"the models give {', '.join(given)}; what was measured is {', '.join(ends)}.")
+        for names, model in self.models:
+            model.of_quantities({name: ends[name] for name in names} if len(names) > 1 else {"": ends[names[0]]})
+        return SeveralQuantities(self, tuple((name, *pair) for name, pair in ends.items()))
+
+    def check(self, symbols: Sequence[str]) -> None:
+        for _, model in self.models:
+            model.check(symbols)
+
+    def prepared_in(self, folder: Path) -> Forward:
+        prepared = []
+        for number, (names, model) in enumerate(self.models, start=1):
+            (own_folder := folder / f"model-{number}").mkdir(exist_ok=True)
+            prepared.append((names, model.prepared_in(own_folder)))
+        return SeveralModels(tuple(prepared))
+
+
+def as_forward(forward: Forward | Callable[..., Any] | Mapping[Any, Any]) -> Forward:
+    """Return a model for a function, or for several models by the names of what they give; a model as it is.
 
     Raises
     ------
     InputError
-        When it is neither.
+        When it is none of these.
     """
     if isinstance(forward, Forward):
         return forward
+    if isinstance(forward, Mapping):
+        pairs = [((names,) if isinstance(names, str) else tuple(names), model) for names, model in forward.items()]
+        return SeveralModels(tuple((names, as_forward(model)) for names, model in pairs))
     if not callable(forward):
         raise InputError(f"the forward model must be a function, not {forward!r}. {ADVICE}.")
     return CallableForward(forward)

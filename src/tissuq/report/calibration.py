@@ -10,7 +10,7 @@ import numpy as np
 
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
-from tissuq.emulation import Calibration, DeckForward, FileForward
+from tissuq.emulation import Calibration, DeckForward, FileForward, SeveralModels
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
@@ -119,12 +119,13 @@ def _next_step(study: CalibrationStudy) -> str:
 
 def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the user's files, so that the run can be repeated, and the settings that name the copies."""
-    source = beside / study.settings.file
-    copies: dict[str, Any] = {f"{INPUT}/{source.name}": source}
-    relocated: dict[str, Any] = {"file": f"{INPUT}/{source.name}"}
-    if isinstance(study.forward, DeckForward):
-        of_model, relocated_model = _model_copies(study.forward, study.settings, beside)
-        return copies | of_model, relocated | relocated_model
+    sources = [beside / file for file in study.settings.files]
+    folders = _folders(len(sources))
+    copies: dict[str, Any] = {f"{place}/{source.name}": source for place, source in zip(folders, sources, strict=True)}
+    relocated: dict[str, Any] = {"files": tuple(copies)}
+    if decks := _decks(study):
+        of_models, relocated_models = _model_copies(decks, study.settings, beside)
+        return copies | of_models, relocated | relocated_models
     if study.settings.forward is None:
         return copies, relocated
     match, file = LAW.fullmatch(study.settings.forward), FileForward(study.settings.forward).file
@@ -134,16 +135,32 @@ def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict
     return copies, relocated | {"forward": study.settings.forward}
 
 
+def _folders(count: int) -> list[str]:
+    """Return the folders of the input of each of several experiments."""
+    return [INPUT] if count == 1 else [f"{INPUT}/{number}" for number in range(1, count + 1)]
+
+
+def _decks(study: CalibrationStudy) -> list[tuple[tuple[str, ...], DeckForward]]:
+    """Return the finite-element models, each with the names of what it gives; none of other forward models."""
+    if isinstance(study.forward, DeckForward):
+        return [(tuple(study.data), study.forward)]
+    models = study.forward.models if isinstance(study.forward, SeveralModels) else ()
+    return [(names, model) for names, model in models if isinstance(model, DeckForward)]
+
+
 def _model_copies(
-    forward: DeckForward, settings: CalibrationSettings, beside: Path
+    decks: list[tuple[tuple[str, ...], DeckForward]], settings: CalibrationSettings, beside: Path
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the files of a finite-element model and of functions, and the settings that name their copies."""
-    deck, stored = forward.read_deck, f"{INPUT}/{MODEL}"
-    copies: dict[str, Any] = {f"{stored}/{name}": deck.root / name for name in deck.files}
-    copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
-    relocated: dict[str, Any] = {"model": f"{stored}/{deck.main}"}
-    places = [stored_place(deck, Path(file)) for file in forward.also]
-    relocated["also"] = [place if Path(place).is_absolute() else f"{INPUT}/{place}" for place in places]
+    """Return the files of finite-element models and of functions, and the settings that name their copies."""
+    copies, models, places = dict[str, Any](), list[str](), list[str]()
+    for place, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
+        deck, stored = forward.read_deck, f"{place}/{MODEL}"
+        copies |= {f"{stored}/{name}": deck.root / name for name in deck.files}
+        copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
+        models.append(f"{stored}/{deck.main}")
+        also = [stored_place(deck, Path(file)) for file in forward.also]
+        places = [file if Path(file).is_absolute() else f"{place}/{file}" for file in also]
+    relocated: dict[str, Any] = {"models": tuple(models), "also": places}
     for setting in ("quantities", "along"):
         texts = dict(getattr(settings, setting))
         for name, text in texts.items():
@@ -304,8 +321,7 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
             f"These are the posterior of the run {Path(study.prior_run).name}, as normal and log-normal priors with "
             "its means, sds and correlations; that run's discrepancy is left out."
         )
-    if isinstance(study.forward, DeckForward):
-        blocks.append(_model_run(study.forward, study))
+    blocks += [_model_run(forward, names, study) for names, forward in _decks(study)]
     if study.posterior is not None:
         blocks.append(
             f"The posterior of the material {study.posterior.model.material.name} is in posterior/none.nc: tissuq "
@@ -314,16 +330,16 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _model_run(forward: DeckForward, study: CalibrationStudy) -> tuple[str, ...]:
+def _model_run(forward: DeckForward, names: tuple[str, ...], study: CalibrationStudy) -> tuple[str, ...]:
     """Return how a finite-element model was run, and how its numbers became those of the file."""
     settings, solver = study.settings, forward.program
-    quantities = zip(study.data.values(), settings.quantities.items(), forward.factors.values(), strict=True)
+    named = [name or next(iter(settings.quantities)) for name in names]
     of_file = (
-        f"{data.measured_label} of the file is {factor:.6g} times {name} ({quantity})"
-        for data, (name, quantity), factor in quantities
+        f"{study.data[name].measured_label} of the file is {factor:.6g} times {of} ({settings.quantities[of]})"
+        for name, of, factor in zip(names, named, forward.factors.values(), strict=True)
     )
-    control = next(iter(study.data.values())).control_label
-    controlled = "the time of the model" if forward.along is None else f"{next(iter(settings.along.values()))}"
+    control = study.data[names[0]].control_label
+    controlled = forward.along or "the time of the model"
     return (
         f"The material '{forward.replaced}' of {forward.read_deck.main} got the card of {forward.material} for every "
         f"run. Solver: {solver.name}, `{solver.command or solver.template}`. Unit of stress of the model: "

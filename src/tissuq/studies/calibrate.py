@@ -36,7 +36,7 @@ FloatArray = NDArray[np.float64]
 def calibrate(
     control: ArrayLike | Mapping[str, ArrayLike],
     measured: ArrayLike | Mapping[str, ArrayLike],
-    forward: Forward | Callable[..., Any],
+    forward: Forward | Callable[..., Any] | Mapping[str | tuple[str, ...], Forward | Callable[..., Any]],
     priors: Mapping[str, Prior],
     *,
     discrepancy: str | Discrepancy = "none",
@@ -64,7 +64,8 @@ def calibrate(
     forward : callable or Forward
         ``forward(parameters)`` or ``forward(parameters, control)``, with a dictionary of parameters by name: returns n
         outputs; with several quantities control and outputs are dictionaries by their names. Or a
-        `tissuq.UmbridgeForward`, or a `tissuq.DeckForward`.
+        `tissuq.UmbridgeForward`, or a `tissuq.DeckForward`. Where every experiment has a model of its own, these by the
+        names of what they give: ``{"force": indentation, ("pull", "neck"): tension}``.
     priors : mapping of str to Prior
         Of every parameter of the model: together they say where it is run. And, to replace the usual ones, of the
         discrepancy's ``c`` and ``psi`` and of ``noise_sd``.

@@ -23,7 +23,7 @@ from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.calibrate import calibrate
-from tissuq.studies.calibration_settings import CalibrationSettings
+from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
 from tissuq.studies.stream import Step, silent
 
 __all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
@@ -112,8 +112,9 @@ def run_calibration(
     settings = with_priors_of_run(settings, folder)
     if settings.material is not None:
         check_material(settings.material, settings.parameter_priors, settings.unit)
-    data = _read(settings, folder)
-    forward = settings.forward_model(folder, {name: measured.units for name, measured in data.items()}, **running)
+    data, experiments = _read(settings, folder)
+    units = {name: measured.units for name, measured in data.items()}
+    forward = settings.forward_model(folder, units, experiments, **running)
     start = perf_counter()
     names = ("discrepancy", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
     calibration = calibrate(
@@ -153,23 +154,55 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
     return settings.model_copy(update=changes)
 
 
-def _read(settings: CalibrationSettings, folder: Path) -> dict[str, Measured]:
-    """Return what was measured, by quantity; of several, rows count where there is a value."""
-    table = read_table(folder / settings.file, settings.skip_rows, settings.sheet)
+def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measured], list[OfModel]]:
+    """Return what was measured, by quantity, and what of it each file has; rows count where there is a value."""
+    tables = [read_table(folder / file, settings.skip_rows, settings.sheet) for file in settings.files]
     if settings.measured_names == ("",):
-        return {"": _measured(table, _places(table, (settings.control, settings.measured)), settings.every)}
-    places = {name: _place(table, name) for name in settings.measured_names}
-    others = [index for index in range(len(table.names)) if index not in places.values()]
-    if settings.control is None and len(others) != 1:
-        names = ", ".join(table.label(index) for index in others)
+        columns = _places(tables[0], (settings.control, settings.measured))
+        return {"": _measured(tables[0], columns, settings.every)}, [OfModel(("",), next(iter(settings.along), ""))]
+    data: dict[str, Measured] = {}
+    experiments = []
+    for table, names in zip(tables, _names_of_files(settings, tables), strict=True):
+        places = {name: _place(table, name) for name in names}
+        controls = [name for name in settings.along if _has(table, name)] if len(tables) > 1 else [*settings.along]
+        control = _control(table, [*places.values()], settings.control, controls if len(tables) > 1 else [])
+        data |= {
+            name: _measured(table.without_missing([place]), (control, place), settings.every)
+            for name, place in places.items()
+        }
+        experiments.append(OfModel(tuple(names), controls[0] if controls else ""))
+    return data, experiments
+
+
+def _names_of_files(settings: CalibrationSettings, tables: Sequence[Table]) -> list[list[str]]:
+    """Return the names of the quantities of each file, which are those of its columns."""
+    if len(tables) == 1:
+        return [list(settings.measured_names)]
+    for option, names in (("--qoi", settings.measured_names), ("--along", settings.along)):
+        for name in names:
+            having = [str(table.file) for table in tables if _has(table, name)]
+            if len(having) != 1:
+                files = f"{' and '.join(having)} have" if having else "no file has"
+                raise InputError(f"{files} a column '{name}' ({option} {name}=...): exactly one file must have it.")
+    names_of_files = [[name for name in settings.measured_names if _has(table, name)] for table in tables]
+    for table, of_file in zip(tables, names_of_files, strict=True):
+        if not of_file:
+            raise InputError(f"{table.file} has no column that is called as a quantity (--qoi NAME=...).")
+    return names_of_files
+
+
+def _control(table: Table, measured: Sequence[int], requested: str | int | None, named: Sequence[str]) -> int:
+    """Return the column of the control: the one that is requested, that --along names, or that is left."""
+    columns = [index for index in range(len(table.names)) if index not in measured]
+    if requested is None and len(named) == 1:
+        requested = named[0]
+    if requested is None and len(columns) != 1:
+        names = ", ".join(table.label(index) for index in columns)
         raise InputError(f"{table.file} has the columns {names}: name that of the control (--control NAME).")
-    control = others[0] if settings.control is None else _place(table, settings.control)
-    if control in places.values():
+    control = columns[0] if requested is None else _place(table, requested)
+    if control in measured:
         raise InputError(f"{table.file}: the control {table.label(control)} is one of the quantities.")
-    return {
-        name: _measured(table.without_missing([place]), (control, place), settings.every)
-        for name, place in places.items()
-    }
+    return control
 
 
 def _measured(table: Table, columns: tuple[int, int], every: int) -> Measured:
@@ -193,6 +226,11 @@ def _places(table: Table, requested: Sequence[str | int | None]) -> tuple[int, i
     if columns[0] == columns[1]:
         raise InputError(f"{table.file}: control and measured values are the same column {table.label(columns[0])}.")
     return columns[0], columns[1]
+
+
+def _has(table: Table, name: str) -> bool:
+    """Return whether a table has a column of that name, with its unit or without."""
+    return any(column == name or heading(column).quantity == plain(name) for column in table.names)
 
 
 def _place(table: Table, requested: str | int) -> int:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from pydantic import field_validator, model_validator
 
@@ -17,15 +17,23 @@ from tissuq.studies.settings import positive_or_unknown
 from tissuq.studies.shared_options import seed
 
 if TYPE_CHECKING:
+    from tissuq.emulation.deck_forward import DeckForward
     from tissuq.emulation.forward import Forward
     from tissuq.parameters.priors import Prior
 
-__all__ = ["CalibrationSettings"]
+__all__ = ["CalibrationSettings", "OfModel"]
 
 OWN = "Your own finite-element model"
 NUMBER = r"\d+\.?\d*"
 RANGE = re.compile(rf"{NUMBER}:{NUMBER}")
 """Smallest and largest stretch."""
+
+
+class OfModel(NamedTuple):
+    """What a finite-element model gives, and what of it the controls are: the time of the model, if empty."""
+
+    names: tuple[str, ...]
+    controlled: str
 
 
 class CalibrationSettings(ModelSettings):
@@ -34,22 +42,33 @@ class CalibrationSettings(ModelSettings):
     With ``model``, what was measured is in the units of the file.
     """
 
-    file: str = argument(
+    files: tuple[str, ...] = argument(
         ...,
-        "CSV or Excel file with a column of controls and one of measured values (with several --qoi one of each name).",
-        takes=Path,
-        parse=str,
+        "CSV or Excel file with a column of controls and one of measured values (with several --qoi one of each name); "
+        "of several experiments a file each.",
+        takes=list[Path],
+        parse=lambda paths: tuple(map(str, paths)),
+        min_length=1,
     )
     forward: str | None = option(
         None, "Function of the model: file.py:function or package.module:function. Its code is run."
     )
     umbridge: str | None = option(None, "Instead: address of an UM-Bridge server, such as http://localhost:4242.")
     server_model: str = option("forward", "Name of the model on that server.")
-    model: str | None = option(
-        None, "Instead: your finite-element model, a deck as of tissuq ensemble.", takes=Path, parse=str, group=OWN
+    models: tuple[str, ...] = option(
+        (),
+        "Instead: your finite-element model, a deck as of tissuq ensemble; of several files one each, in their order.",
+        name="model",
+        takes=list[Path],
+        parse=lambda paths: tuple(map(str, paths)),
+        group=OWN,
     )
-    replaced: str | None = option(
-        None, "Name (ANSYS: number) of the material in it whose card follows the parameters.", name="replace", group=OWN
+    replaced: tuple[str, ...] = option(
+        (),
+        "Name (ANSYS: number) of the material in it whose card follows the parameters; of several models one for all, "
+        "or one each.",
+        name="replace",
+        group=OWN,
     )
     quantities: dict[str, str] = option(
         default_factory=dict,
@@ -133,17 +152,20 @@ class CalibrationSettings(ModelSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _named_on_server(cls, values: Any) -> Any:
-        """Take the former name of the model on a server."""
-        if isinstance(values, dict) and values.get("umbridge") and values.get("model"):
-            return {name: value for name, value in values.items() if name != "model"} | {
-                "server_model": values["model"]
-            }
-        return values
+    def _of_earlier_versions(cls, values: Any) -> Any:
+        """Take what a single file and a single model were called, and a model on a server."""
+        if not isinstance(values, dict):
+            return values
+        former = {"file": "files", "model": "server_model" if values.get("umbridge") else "models"}
+        values = {former.get(name, name): value for name, value in values.items()}
+        several = ("files", "models", "replaced")
+        return {
+            name: [value] if name in several and isinstance(value, str) else value for name, value in values.items()
+        }
 
     @model_validator(mode="after")
     def _one_model(self) -> Self:
-        if sum(source is not None for source in (self.forward, self.umbridge, self.model)) != 1:
+        if sum(bool(source) for source in (self.forward, self.umbridge, self.models)) != 1:
             raise ValueError("give one forward model: a function in a file (forward), a server (umbridge) or a deck "
                              "(model)")  # fmt: skip
         if not self.priors and self.prior_run is None:
@@ -162,7 +184,9 @@ class CalibrationSettings(ModelSettings):
 
     def _check_deck(self) -> None:
         names = [*self.quantities, *self.along]
-        if self.model is None:
+        if not self.models:
+            if len(self.files) > 1:
+                raise ValueError("several files need a finite-element model each (model)")
             if named := [name for name in ("replaced", "quantities", "along", "factors") if getattr(self, name)]:
                 raise ValueError(f"{', '.join(named)} belong to a finite-element model: give it, too (model)")
             return
@@ -170,8 +194,19 @@ class CalibrationSettings(ModelSettings):
                    "range": "--range 0.7:1.3"}  # fmt: skip
         if lacking := [text for name, text in missing.items() if not getattr(self, name)]:
             raise ValueError(f"a finite-element model needs {', '.join(lacking)}, too")
-        if len(self.along) > 1:
-            raise ValueError("all quantities have the same controls: give at most one --along")
+        if len(self.models) != len(self.files):
+            raise ValueError(
+                f"every file has its model, in the same order: there are {len(self.files)} files and "
+                f"{len(self.models)} models"
+            )
+        if len(self.replaced) not in (1, len(self.models)):
+            raise ValueError(f"give --replace once for all models, or for each of the {len(self.models)}")
+        if len(self.along) > len(self.models):
+            raise ValueError("all quantities of a model have the same controls: give at most one --along for each")
+        if len(self.quantities) < len(self.models):
+            raise ValueError(
+                f"every model gives something that was measured: give --qoi for each of {len(self.models)}"
+            )
         if len(set(names)) < len(names):
             raise ValueError(f"what was measured and its control are both called {names[0]}: rename one")
         if unknown := [name for name in self.factors if name not in names]:
@@ -209,7 +244,7 @@ class CalibrationSettings(ModelSettings):
         self,
         beside: Path = Path(),
         units: Mapping[str, tuple[str, str]] = MappingProxyType({}),
-        timeout: float | None = None,
+        experiments: Sequence[OfModel] | None = None,
         **running: Any,
     ) -> Forward:
         """Return what is run.
@@ -221,28 +256,52 @@ class CalibrationSettings(ModelSettings):
         units : mapping of str to (str, str)
             Of control and measured values in the file, by the names of `measured_names`; empty where it does not say,
             which is refused for quantities that have a unit in a finite-element model.
-        timeout, **running
+        experiments : sequence of OfModel, optional
+            What each of several finite-element models gives; a single one gives everything.
+        **running
             How a finite-element model is run: fields of `tissuq.DeckForward`.
         """
-        from tissuq.decks.quantity import located
-        from tissuq.emulation import DeckForward, FileForward, UmbridgeForward
-        from tissuq.emulation.deck_units import conversion
+        from tissuq.emulation import FileForward, SeveralModels, UmbridgeForward
 
         if self.umbridge:
             return UmbridgeForward(self.umbridge, self.server_model)
-        if self.model is None:
+        if not self.models:
             return FileForward(str(self.forward))
+        experiments = experiments or [OfModel(self.measured_names, next(iter(self.along), ""))]
+        replaced = self.replaced * (len(self.models) if len(self.replaced) == 1 else 1)
+        decks = [
+            self._deck_forward(beside / model, of_model, material, units, beside, running)
+            for model, of_model, material in zip(self.models, experiments, replaced, strict=True)
+        ]
+        pairs = zip([of_model.names for of_model in experiments], decks, strict=True)
+        return decks[0] if len(decks) == 1 else SeveralModels(tuple(pairs))
+
+    def _deck_forward(
+        self,
+        model: Path,
+        of_model: OfModel,
+        replaced: str,
+        units: Mapping[str, tuple[str, str]],
+        beside: Path,
+        running: Mapping[str, Any],
+    ) -> DeckForward:
+        from tissuq.decks.quantity import located
+        from tissuq.emulation import DeckForward
+        from tissuq.emulation.deck_units import conversion
+
         cards = self.card_settings()
-        quantities = {name: located(text, beside) for name, text in self.quantities.items()}
+        texts = {key: self.quantities[key] if key else next(iter(self.quantities.values())) for key in of_model.names}
+        named = {key: key or next(iter(self.quantities)) for key in texts}
+        quantities = {named[key]: located(text, beside) for key, text in texts.items()}
         factors = {
-            name: self.factors.get(name, 1.0) * conversion(text, cards, units.get(key, ("", ""))[1])
-            for key, (name, text) in zip(self.measured_names, self.quantities.items(), strict=True)
+            named[key]: self.factors.get(named[key], 1.0) * conversion(text, cards, units.get(key, ("", ""))[1])
+            for key, text in texts.items()
         }
-        is_one, control_unit = len(quantities) == 1, next(iter(units.values()), ("", ""))[0]
-        controlled, along = next(iter(self.along.items()), ("", None))
+        is_one, control_unit = len(quantities) == 1, units.get(of_model.names[0], ("", ""))[0]
+        controlled, along = of_model.controlled, self.along.get(of_model.controlled)
         return DeckForward(
-            beside / self.model,
-            str(self.replaced),
+            model,
+            replaced,
             str(self.material),
             next(iter(quantities.values())) if is_one else quantities,
             self.stretches,
@@ -256,7 +315,6 @@ class CalibrationSettings(ModelSettings):
             card_format=self.card_format,
             cards=cards,
             also=tuple(str((beside / file).absolute()) for file in self.also),
-            timeout=timeout,
             **running,
         )
 
