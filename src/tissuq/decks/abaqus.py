@@ -25,6 +25,14 @@ ENDS = {
 }  # fmt: skip
 """Keywords below which no option of a material stands, as well as those of sections."""
 
+NAMES_OF_SETS, NAMES_OF_ELEMENT_SETS = ("NSET", "NEWSET"), ("ELSET",)
+"""Parameters by which keywords name the sets that they make."""
+USERS = {
+    "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE", "CONTACTPRINT",
+    "MONITOR",
+}  # fmt: skip
+"""Keywords that ask for what happens in a set, which another one makes."""
+
 
 @dataclass(frozen=True)
 class Keyword:
@@ -103,6 +111,13 @@ class AbaqusDeck(DeckFormat):
 
     def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
         return node_sets(files)
+
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        wanted = NAMES_OF_SETS + NAMES_OF_ELEMENT_SETS * of_elements
+        keywords = [keyword for content in files for keyword in keywords_of(content) if keyword.name not in USERS]
+        return {
+            keyword.parameters[name].upper() for keyword in keywords for name in wanted if name in keyword.parameters
+        }
 
 
 def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:

@@ -113,6 +113,13 @@ class DeckFormat(ABC):
         """
         return {}
 
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        """Return the names, in capitals, of all sets that a result file can have; none where these are not known.
+
+        With ``of_elements`` also those of elements, whose stresses some programs write.
+        """
+        return set()
+
     def matches(self, material: DeckMaterial, wanted: str) -> bool:
         """Return whether a material is the one that is wanted: by its name, whatever its case, or its number."""
         return wanted.strip().casefold() in (material.name.strip().casefold(), material.number.casefold())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from xml.parsers.expat import ExpatError, ParserCreate
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, decoded
@@ -16,6 +17,8 @@ SHARED = "rigid body"
 
 KEPT = ("density", "mat_axis")
 """What stays of a material; its axes where the card has fibres."""
+SETS = ("Nodes", "NodeSet", "Surface")
+"""Elements whose names are those of sets in the plot file."""
 FIBRES = "Holzapfel-Gasser-Ogden"
 """The type of cards with fibres."""
 
@@ -40,6 +43,9 @@ class FEBioDeck(DeckFormat):
     def materials(self, content: bytes) -> list[DeckMaterial]:
         return _Parsed(content).materials
 
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        return set().union(*(_Parsed(content).sets for content in files))
+
     def fragment(self, material: DeckMaterial, block: str) -> str:
         head, density, axes = material.remains
         kind = TYPE.search(block.partition(">")[0])
@@ -59,6 +65,7 @@ class _Parsed:
         self.content = content
         self.materials: list[DeckMaterial] = []
         self.includes: list[str] = []
+        self.sets: set[str] = set()
         self._stack: list[str] = []
         self._start = 0
         self._attributes: dict[str, str] = {}
@@ -76,6 +83,8 @@ class _Parsed:
     def _open(self, name: str, attributes: dict[str, str]) -> None:
         if "from" in attributes:
             self.includes.append(attributes["from"])
+        if name in SETS and "name" in attributes:
+            self.sets.add(attributes["name"].strip().upper())
         if name == "material" and self._stack[-1:] == ["Material"]:
             self._start, self._attributes = self._parser.CurrentByteIndex, attributes
             self._kept = dict.fromkeys(KEPT, (0, 0))

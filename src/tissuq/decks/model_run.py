@@ -20,10 +20,11 @@ from tissuq.decks.calculix_results import CalculiXResults
 from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
 from tissuq.decks.quantity import Component, Quantity, Results
+from tissuq.decks.result_file import ALL, unknown_set
 from tissuq.decks.solver import LOG, Solver
 from tissuq.errors import InputError
 
-__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "clear_unfinished", "sets_of"]
+__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "check_sets", "clear_unfinished", "sets_of"]
 
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
@@ -140,6 +141,22 @@ def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
     """
     is_needed = any(isinstance(quantity, Component) for quantity in quantities)
     return deck.format.node_sets(list(deck.files.values())) if is_needed else {}
+
+
+def check_sets(deck: Deck, quantities: Iterable[Quantity]) -> None:
+    """Refuse a quantity of a set that the deck does not have, where all of its sets are known.
+
+    Raises
+    ------
+    InputError
+        When there is one.
+    """
+    for quantity in quantities if not deck.outside else ():
+        if isinstance(quantity, Component) and quantity.set_name != ALL:
+            of_elements = quantity.kind in ("S", "E")
+            known = deck.format.set_names(list(deck.files.values()), of_elements=of_elements)
+            if known and quantity.set_name.rpartition(".")[2] not in known:  # those of instances are PART-1-1.TOP
+                raise InputError(f"{quantity.text}: {unknown_set(quantity.set_name, known)}")
 
 
 def _digest(*parts: object) -> str:

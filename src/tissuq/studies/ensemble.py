@@ -17,7 +17,7 @@ from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantit
 from tissuq.decks.deck import DeckMaterial
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
 from tissuq.decks.model_files import MODEL, extra_files
-from tissuq.decks.model_run import ModelRun, carried_out, clear_unfinished, sets_of
+from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, sets_of
 from tissuq.decks.quantity import located
 from tissuq.errors import InputError
 from tissuq.export import CALCULIX_PREFIX, Cards, card_format
@@ -167,6 +167,7 @@ def prepare_ensemble(
     _check_names(quantities, ensembles)
     _check_functions(quantities)
     prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards)
+    check_sets(deck, quantities)
     sets_of(deck, quantities)
     for quantity in quantities if not is_dry else ():
         quantity.check()
