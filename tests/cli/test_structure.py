@@ -96,8 +96,13 @@ def test_a_mesh_of_your_own_is_copied_and_its_recipe_goes_on(cli, here, run):
     points = meshio.read(folder / "fields.vtu")
     np.testing.assert_allclose(points.points[:, :2], block.points)
     np.testing.assert_allclose(points.point_data["mean displacement"][block.points[:, 1] == 3.0, 1], -0.3)
-    said = cli("structure", "--config", folder / "run.toml", "--no-figures", "--out", "again", "--workers", 1)
-    assert said.status == 0, said.err
+    recipe = (folder / "run.toml").read_text(encoding="utf-8")
+    assert "case" not in recipe
+    (folder / "earlier.toml").write_text(f'case = "indentation"\n{recipe}', encoding="utf-8")  # of an earlier version
+    for number, name in enumerate(("earlier.toml", "run.toml")):
+        out = ["--out", ("early", "again")[number], "--workers", 1]
+        said = cli("structure", "--config", folder / name, "--no-figures", *out)
+        assert said.status == 0, said.err
     tables = [(path / "forces.csv").read_text(encoding="utf-8") for path in (folder, here / "again")]
     assert tables[0] == tables[1]
     meshio.Mesh(np.pad(1.1 * block.points, ((0, 0), (0, 1))), [("quad", block.cells)]).write(here / "block.vtu")
@@ -177,6 +182,7 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
     ("arguments", "words"),
     [
         ([], ["give the RUN folder of a fit"]),
+        (["run", "--config", "run.toml"], ["'run.toml' is of a simulation", "leave out --config, or run."]),
         (["nowhere"], ["no run folder 'nowhere'"]),
         (["run", "--case", "beam"], ["no case named 'beam'", "bar, indentation"]),
         (["run", "--size", "width=3"], ["no size 'width'", "punch_radius=0.75"]),

@@ -88,7 +88,12 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
     model = stated.get("model")
     if run is not None and model is None and run.is_file():
         run, model = None, str(run)  # every material has its own run
-    if bool(model) == bool(call.config) or (run and not model):
+    if call.config and (run or model):
+        raise InputError(
+            f"'{call.config}' names the runs and the model of the ensemble that it repeats: leave out --config, or "
+            f"{' '.join(str(each) for each in (run, model) if each)}."
+        )
+    if not (model or call.config):
         raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
     materials = _materials(stated.get("materials", []), run)
     for example, value in (("--replace NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):

@@ -8,6 +8,8 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import model_validator
+
 from tissuq.errors import InputError
 from tissuq.registry import find
 from tissuq.studies.option import option
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["SimulationSettings"]
 
 
+USUAL_CASE = "indentation"
 BODY = "A body of your own"
 NUMBER = r"(?P<size>[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)"
 MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
@@ -40,9 +43,9 @@ class SimulationSettings(RunSettings):
     ``sizes`` are fields of the case (mm); ``force_noise`` is in N.
     """
 
-    case: str = option(
-        "indentation", "indentation (flat punch, disc), sphere (pressed on a disc), bar (clamped, in tension) or plate "
-        "(with a hole)."
+    case: str | None = option(
+        None, "indentation (flat punch, disc), sphere (pressed on a disc), bar (clamped, in tension) or plate (with a "
+        "hole) [indentation]."
     )  # fmt: skip
     sizes: dict[str, float | str] = option(
         default_factory=dict,
@@ -101,6 +104,16 @@ class SimulationSettings(RunSettings):
     shape: str | None = option(None, "axisymmetric (around y) or plane (strain), of a mesh in a plane.", group=BODY)
     parts: float = option(1.0, "Such bodies, by symmetry, that bear the force side by side.", gt=0, lt=inf, group=BODY)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _case_unless_mesh(cls, values: Any) -> Any:
+        """Name the usual case where there is no mesh, and none that recipes of earlier versions named beside one."""
+        if not isinstance(values, dict):
+            return values
+        if values.get("mesh") is None:
+            return {**values, "case": values.get("case") or USUAL_CASE}
+        return {**values, "case": None if values.get("case") == USUAL_CASE else values.get("case")}
+
     def sized_case(self, beside: Path = Path()) -> Case:
         """Return the case with its sizes, or the body of a mesh that lies beside a recipe.
 
@@ -114,6 +127,7 @@ class SimulationSettings(RunSettings):
 
         if self.mesh is not None:
             return self._body(beside / self.mesh)
+        assert self.case is not None  # noqa: S101 (as validated)
         kind = find(Case, "case", self.case, InputError)
         of_body = [name for name in OF_BODY if getattr(self, name) != type(self).model_fields[name].get_default()]
         if self.hold or of_body or issubclass(kind, BodyFromFile):
@@ -136,8 +150,7 @@ class SimulationSettings(RunSettings):
         from tissuq.finite_elements.mesh_file import BodyFromFile
 
         given = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
-        is_of_case = self.sizes or self.case != type(self).model_fields["case"].default
-        if len(given) != 1 or is_of_case or bool(self.watch) != bool(self.inflate):
+        if len(given) != 1 or self.sizes or self.case or bool(self.watch) != bool(self.inflate):
             raise InputError(
                 "a body from a mesh has no --case or --size, and needs one of --move ymax=y:-0.4, --press ymax=y:-0.4, "
                 "and --inflate inner=2 --watch outer=x."
