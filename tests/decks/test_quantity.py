@@ -155,6 +155,22 @@ def test_a_set_that_a_deck_with_its_included_files_does_not_have_is_refused_befo
     check_sets(replace(deck, outside=("/elsewhere.inp",)), quantities)
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "size"),
+    [
+        ("abaqus", "*ELEMENT, TYPE=C3D10\n1, 1,2,3,4,5,6,7\n, 8,9,10\n*ELEMENT, type=s4\n2, 1, 2, 3, 4\n", (1, 3)),
+        ("abaqus", "*ELEMENT, TYPE=CAX4R\n1, 1,2,3,4\n2, 1,2,3,4\n*ELEMENT, TYPE=SPRING1\n3, 1\n", (2, 2)),
+        ("abaqus", "*ELEMENT, TYPE=C3D8\n1, 1,2,3,4,5,6,7,8\n*ELGEN\n1, 10\n", None),
+        ("abaqus", "*NODE\n1, 0.\n", None),
+        ("febio", '<febio_spec><Mesh><Elements type="tet10"><elem id="1">1</elem><elem id="2">1</elem></Elements>'
+         '<Elements type="quad4"><elem id="3">1</elem></Elements></Mesh></febio_spec>', (2, 3)),
+        ("ansys", "/PREP7\n", None),
+    ],
+)  # fmt: skip
+def test_the_number_of_elements_and_their_dimensions_are_known_from_the_deck_or_not(name, text, size):
+    assert deck_formats()[name]().mesh_size([text.encode()]) == size
+
+
 def test_sets_of_nodes_are_those_of_the_manual():
     deck = b"*NODE, NSET=All\n1, 0., 0., 0.\n2, 0., 0., 0.\n*NSET, NSET=Some\n1,\n*nset, nset=Row, generate\n2, 8, 3\n"
     deck += b"*NSET, NSET=BOTH\nSome, 9\nrow\n"

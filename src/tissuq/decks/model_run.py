@@ -63,6 +63,8 @@ class ModelRun:
         Keep the files of the solver.
     abaqus : str
         The program that opens .odb files; unless given, the first word of the solver's command.
+    mesh : str
+        A digest of the files of the model, where it is another than that of the other runs.
     """
 
     family: str
@@ -79,11 +81,13 @@ class ModelRun:
     retries: int = 0
     keep: bool = True
     abaqus: str = ""
+    mesh: str = ""
 
     @property
     def solver_key(self) -> str:
         """A digest of all that the solver's run depends on."""
-        return _digest(self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
+        parts = (self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
+        return _digest(*parts, *([self.mesh] if self.mesh else []))
 
     @property
     def key(self) -> str:
@@ -93,7 +97,7 @@ class ModelRun:
     @property
     def label(self) -> str:
         """The text shown when the task is done."""
-        return f"draw {self.number + 1}"
+        return f"draw {self.number + 1}{' on the finer mesh' if self.mesh else ''}"
 
     @property
     def deck(self) -> Deck:

@@ -14,7 +14,7 @@ from tissuq.finite_elements.case import Case
 from tissuq.finite_elements.first_order import controlled, draws_in_full, first_order_forces
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.response import BULK_RATIO, Run, Solve, run_in_turn
-from tissuq.finite_elements.spread import force_table
+from tissuq.finite_elements.spread import force_table, mesh_factor, mesh_free
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.posterior.posterior import Posterior
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COMPLETE",
     "FAMILIES",
+    "FINE_MESH",
     "MATERIAL_ONLY",
     "WITHOUT",
     "Failure",
@@ -118,28 +119,19 @@ class Simulation:
         Strains are singular at the edge of a punch and at a clamp, so that errors halve with the cells; in a body
         without sharp edges they fall to a quarter (`Case.mesh_order`).
         """
-        if not self.mesh_changes:
-            return np.ones(len(self.travel))
-        finer = 2.0**self.case.mesh_order
-        return np.asarray(1 + finer / (finer - 1) * np.interp(self.travel, *np.transpose(self.mesh_changes)))
+        return mesh_factor(self.travel, self.mesh_changes, 2.0**self.case.mesh_order)
 
     def table(self) -> pd.DataFrame:
         """Return band and shares of the variance at every step, N: see `tissuq.finite_elements.spread.force_table`.
 
-        Where a finer mesh was computed, also the band for cells without size (``mesh_free_...``); a quarter of that
-        correction is taken as the standard deviation of its error.
+        Where a finer mesh was computed, also the band for cells without size, and the share of its error: see
+        `tissuq.finite_elements.spread.mesh_free`.
         """
         complete = self.forces[COMPLETE]
         material_only, without = self.forces.get(MATERIAL_ONLY, complete), self.forces.get(WITHOUT)
         sources, column = self.ensembles[COMPLETE].sources, self.case.travel_column
         table = force_table(self.travel, complete, material_only, without, self.noise_sd, column, sources)
-        if self.mesh_changes:
-            middle, spread = table["mean"] * self.mesh_factor, table["mean"] * np.abs(self.mesh_factor - 1) / 4
-            table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * self.mesh_factor, spread)
-            for end in ("low", "high"):
-                apart = np.hypot((table[end] - table["mean"]) * self.mesh_factor, 2 * spread)
-                table[f"mesh_free_{end}"] = middle + (apart if end == "high" else -apart)
-        return table
+        return mesh_free(table, self.mesh_factor) if self.mesh_changes else table
 
     @property
     def median_draw(self) -> EnergyDraw:

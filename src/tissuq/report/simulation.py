@@ -277,7 +277,8 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         sentences = (
             f"Q is the {case.response} of a draw with its discrepancy, Q0 that of the same draw with its material "
             "parameters alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of "
-            f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
+            f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise"
+            f"{', with **mesh**, the error of the correction for the size of the cells' * is_mesh_free(table)}.",
             *[of_sources(table)] * bool(simulation.ensembles[COMPLETE].sources),
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
