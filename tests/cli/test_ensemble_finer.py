@@ -101,6 +101,7 @@ def test_it_can_be_added_goes_on_is_in_the_recipe_and_another_finer_model_costs_
         (deck(16), ["--cell-ratio", 1], ["cell_ratio", "greater than 1"]),
         (deck(16).replace("*STEP", "*INCLUDE, INPUT=../model.inp\n*STEP"), [], ["outside of the folder of the model"]),
         (None, ["--cell-ratio", 2], ["give --finer-model FILE, too"]),
+        (None, ["--mesh-order", 2], ["give --finer-model FILE, too"]),
     ],
 )
 def test_a_finer_model_that_cannot_be_used_is_refused_before_a_run(cli, here, meshed, finer, more, words):

@@ -86,6 +86,6 @@ def _coarse_mesh(simulation: Simulation) -> list[str]:
         return []
     change, travel = simulation.mesh_change
     return [
-        f"On a mesh of twice the fineness the {simulation.case.response} at {simulation.case.shown(travel)} "
+        f"On {simulation.finer_mesh} the {simulation.case.response} at {simulation.case.shown(travel)} "
         f"changes by {100 * change:+.1f} %: the mesh is too coarse for it."
     ]

@@ -8,7 +8,7 @@ from pathlib import Path
 from tissuq.studies.model_settings import ModelSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import pairs_of
-from tissuq.studies.shared_options import sampling, seed
+from tissuq.studies.shared_options import mesh_order, sampling, seed
 
 __all__ = ["EnsembleSettings"]
 
@@ -55,6 +55,4 @@ class EnsembleSettings(ModelSettings):
     cell_ratio: float | None = option(
         None, "How many times smaller its elements are [by their number].", gt=1, lt=inf, group=MESH
     )
-    mesh_order: float = option(
-        1.0, "Power of their size with which the error falls: 1 at sharp edges, 2 without.", gt=0, le=8, group=MESH
-    )
+    mesh_order: float | None = mesh_order(MESH)

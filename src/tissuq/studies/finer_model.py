@@ -74,8 +74,8 @@ def finer_model(
         When it lacks a material or a set of the model, is of another format, or has no finer mesh.
     """
     if settings.finer_model is None:
-        if settings.cell_ratio is not None:
-            raise InputError("--cell-ratio is that of the elements of a finer model: give --finer-model FILE, too.")
+        if settings.cell_ratio is not None or settings.mesh_order is not None:
+            raise InputError("--cell-ratio and --mesh-order are of a finer model: give --finer-model FILE, too.")
         return None
     finer = Deck.read(beside / settings.finer_model, deck.format.name, frozenset())
     try:
@@ -86,9 +86,9 @@ def finer_model(
         raise InputError(
             f"the finer model (--finer-model) must have the materials and sets of the model: {error}"
         ) from error
-    number = _middle_draw(ensembles)
+    number, order = _middle_draw(ensembles), settings.mesh_order or 1.0
     if settings.cell_ratio is not None:
-        return FinerModel(finer, number, settings.cell_ratio, settings.mesh_order)
+        return FinerModel(finer, number, settings.cell_ratio, order)
     sizes = [each.format.mesh_size(list(each.files.values())) if not each.outside else None for each in (deck, finer)]
     coarse, fine = sizes
     if coarse is None or fine is None or coarse.dimensions != fine.dimensions:
@@ -102,7 +102,7 @@ def finer_model(
             "finer mesh with --finer-model."
         )
     ratio = float((fine.elements / coarse.elements) ** (1 / coarse.dimensions))
-    return FinerModel(finer, number, ratio, settings.mesh_order, (coarse.elements, fine.elements))
+    return FinerModel(finer, number, ratio, order, (coarse.elements, fine.elements))
 
 
 def _middle_draw(ensembles: Collection[Ensemble]) -> int:

@@ -14,7 +14,7 @@ from tissuq.errors import InputError
 from tissuq.registry import find
 from tissuq.studies.option import option
 from tissuq.studies.option_texts import number_or_text, pairs_of
-from tissuq.studies.shared_options import RunSettings, seed
+from tissuq.studies.shared_options import RunSettings, mesh_order, seed
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
@@ -26,7 +26,7 @@ USUAL_CASE = "indentation"
 BODY = "A body of your own"
 NUMBER = r"(?P<size>[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)"
 MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
-OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts")
+OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts", "finer_mesh", "mesh_order")
 """Options, besides the sets that are held, that say nothing without a mesh."""
 LOADS = {"move": MOVEMENT, "press": MOVEMENT, "inflate": re.compile(f"(?P<set>.+)={NUMBER}", re.IGNORECASE)}
 
@@ -102,6 +102,11 @@ class SimulationSettings(RunSettings):
         None, "Set whose mean displacement is the answer to a pressure, and its direction: outer=x.", group=BODY
     )
     shape: str | None = option(None, "axisymmetric (around y) or plane (strain), of a mesh in a plane.", group=BODY)
+    finer_mesh: str | None = option(
+        None, "The same body with smaller cells: one draw is computed on it, too, for the error of the mesh.",
+        takes=Path, parse=str, group=BODY,
+    )  # fmt: skip
+    mesh_order: float | None = mesh_order(BODY)
     parts: float = option(1.0, "Such bodies, by symmetry, that bear the force side by side.", gt=0, lt=inf, group=BODY)
 
     @model_validator(mode="before")
@@ -144,6 +149,16 @@ class SimulationSettings(RunSettings):
                 wanted = "a word" if isinstance(sizes[name], str) else "a number"
                 raise InputError(f"case '{self.case}': {name} must be {wanted} like {sizes[name]}, not '{value}'.")
         return kind(**self.sizes)
+
+    def finer_case(self, beside: Path = Path()) -> Case | None:
+        """Return the body of the finer mesh; None where there is none.
+
+        Raises
+        ------
+        InputError
+            As `sized_case`.
+        """
+        return None if self.finer_mesh is None else self._body(beside / self.finer_mesh)
 
     def _body(self, file: Path) -> Case:
         from tissuq.finite_elements.inflated import InflatedBody
