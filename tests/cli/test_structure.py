@@ -212,7 +212,10 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
     ("arguments", "words"),
     [
         ([], ["give the RUN folder of a fit"]),
-        (["run", "--config", "run.toml"], ["'run.toml' is of a simulation", "leave out --config, or run."]),
+        (
+            ["run", "--config", "run.toml"],
+            ["'run.toml' is of a simulation", "leave out --config, or the RUN folder of a fit (run)."],
+        ),
         (["nowhere"], ["no run folder 'nowhere'"]),
         (["run", "--case", "beam"], ["no case named 'beam'", "bar, indentation"]),
         (["run", "--size", "width=3"], ["no size 'width'", "punch_radius=0.75"]),

@@ -95,7 +95,8 @@ class Call(Generic[Kind, How]):
         given = self.stated.get(setting)
         if given and self.config:
             raise InputError(
-                f"'{self.config}' is of a {earlier}, and names what that is of: leave out --config, or {_shown(given)}."
+                f"'{self.config}' is of a {earlier}, and names what that is of: leave out --config, or {what} "
+                f"({_shown(given)})."
             )
         if not (given or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
