@@ -66,6 +66,15 @@ def test_a_deck_must_name_its_material_as_calculix_asks(cli, here, sheet):
     assert "rename 'Wall' to 'ELASTIC_FIBER_Wall'" in " ".join(said.err.split())
 
 
+def test_a_draw_of_fibres_is_chosen_for_a_finer_model(cli, here, sheet):
+    sheet(MATERIAL)
+    for name in ("cube.inp", "fine.inp"):
+        (here / name).write_text(DECK)
+    words = ["--qoi", "force=RF1@TIP", "--draws", 4, "--finer-model", "fine.inp", "--cell-ratio", 2, "--dry-run"]
+    said = cli("ensemble", "runs/sheet", "cube.inp", "--replace", "ELASTIC_FIBER_WALL", *words)
+    assert said.status == 0, said.err
+
+
 def test_axes_of_a_material_of_febio_stay(cli, here, sheet):
     sheet("neo-hookean+exponential-fibres@30")
     axes = '<mat_axis type="vector"><a>0,1,0</a><d>1,0,0</d></mat_axis>'

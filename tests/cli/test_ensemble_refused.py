@@ -43,6 +43,7 @@ def test_draws_that_all_fail_are_one_message_with_the_last_lines(cli, here, mode
         ({"TISSUE": "=run"}, ["is not a material"]),
         ({"force=RF2@TOP": "RF2@TOP"}, ["is not a quantity of interest (--qoi)"]),
         ({"force=RF2@TOP": "force=RF9@TOP"}, ["not a quantity", "NAME=RF3@SET"]),
+        ({"force=RF2@TOP": "force=RF2@TOPP"}, ["RF2@TOPP:sum", "sets are BASE, TOP.", "Did you mean 'TOP'?"]),
         ({"ccx": "febio4"}, ["reads decks of the format febio"]),
         ({"ccx": "cxx"}, ["no solver named 'cxx'", "ccx"]),
         ({6: 1}, ["draws", "greater than or equal to 2"]),
@@ -81,6 +82,9 @@ def test_options_that_cannot_be_used_get_one_message(cli, here, model, more, wor
 
 def test_without_a_model_or_a_question_it_says_what_to_give(cli, here, model):
     assert "RUN folder of a fit and your MODEL" in cli("ensemble", "run").err
+    for given in (["run"], ["run", "model.inp"]):
+        said = cli("ensemble", *given, "--config", "run.toml").err
+        assert f"leave out --config, or {' '.join(given)}." in " ".join(said.split())
     assert "has no run" in cli("ensemble", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP").err
     assert "give --replace NAME" in cli("ensemble", "run", "model.inp").err
     assert "give --qoi" in cli("ensemble", "run", "model.inp", "--replace", "TISSUE").err
@@ -126,9 +130,9 @@ def test_a_file_outside_of_the_folder_of_the_model_is_used_only_if_named_and_not
 
 
 def test_a_set_of_a_set_that_is_nowhere_is_refused_before_a_run(cli, here, model):
-    (here / "model.inp").write_text(DECK.replace("*STEP", "*NSET, NSET=ENDS\nTOP, BASE\n*STEP"), encoding="utf-8")
+    (here / "model.inp").write_text(DECK.replace("*STEP", "*NSET, NSET=ENDS\nTOP, SIDE\n*STEP"), encoding="utf-8")
     said = cli("ensemble", *model)
-    assert (said.status, "'ENDS' has 'BASE'" in said.err) == (2, True)
+    assert (said.status, "'ENDS' has 'SIDE'" in said.err) == (2, True)
     assert not started(here)
 
 

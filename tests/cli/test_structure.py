@@ -96,13 +96,48 @@ def test_a_mesh_of_your_own_is_copied_and_its_recipe_goes_on(cli, here, run):
     points = meshio.read(folder / "fields.vtu")
     np.testing.assert_allclose(points.points[:, :2], block.points)
     np.testing.assert_allclose(points.point_data["mean displacement"][block.points[:, 1] == 3.0, 1], -0.3)
-    said = cli("structure", "--config", folder / "run.toml", "--no-figures", "--out", "again", "--workers", 1)
-    assert said.status == 0, said.err
+    recipe = (folder / "run.toml").read_text(encoding="utf-8")
+    assert "case" not in recipe
+    (folder / "earlier.toml").write_text(f'case = "indentation"\n{recipe}', encoding="utf-8")  # of an earlier version
+    for number, name in enumerate(("earlier.toml", "run.toml")):
+        out = ["--out", ("early", "again")[number], "--workers", 1]
+        said = cli("structure", "--config", folder / name, "--no-figures", *out)
+        assert said.status == 0, said.err
     tables = [(path / "forces.csv").read_text(encoding="utf-8") for path in (folder, here / "again")]
     assert tables[0] == tables[1]
     meshio.Mesh(np.pad(1.1 * block.points, ((0, 0), (0, 1))), [("quad", block.cells)]).write(here / "block.vtu")
     said = cli("structure", "run", *mesh, "--move", "ymax=y:-0.3", *few)
     assert (said.status, "holds a simulation of another mesh" in said.err) == (2, True)
+
+
+@pytest.mark.finite_elements
+def test_a_finer_mesh_of_your_own_gives_the_force_for_cells_without_size(cli, here, run):
+    """A block whose faces are held across as it is pressed, singular at its edge, against cells of an eighth."""
+    fem, meshio = pytest.importorskip("felupe"), pytest.importorskip("meshio")
+    for times in (1, 2, 8):
+        block = fem.Rectangle(b=(2.0, 2.0), n=3 * times + 1)
+        mesh = meshio.Mesh(np.pad(block.points, ((0, 0), (0, 1))), [("quad", block.cells)])
+        mesh.write(here / f"block{times}.vtu")
+    options = ["--hold", "ymin=xy", "--hold", "xmin=x", "--hold", "ymax=x", "--shape", "axisymmetric",
+               "--move", "ymax=y:-0.2", "--draws", 3, "--steps", 1, "--workers", 1, "--no-figures"]  # fmt: skip
+    last = {}
+    for times, more in ((1, []), (1, ["--finer-mesh", "block2.vtu"]), (8, [])):
+        said = cli("structure", "run", "--mesh", f"block{times}.vtu", *options, *more, "--out", f"b{times}")
+        assert said.status == 0, said.err
+        last[times] = list(csv.DictReader((here / f"b{times}" / "forces.csv").open(encoding="utf-8")))[-1]
+    coarse, corrected, wanted = (
+        float(row[name]) for row, name in ((last[1], "mean"), (last[1], "mesh_free_mean"), (last[8], "mean"))
+    )
+    assert abs(corrected / wanted - 1) < 0.5 * abs(coarse / wanted - 1)
+    page = (here / "b1" / "report.html").read_text(encoding="utf-8")
+    assert "On a mesh of twice the fineness the force of one draw" in page
+    assert 'finer_mesh = "finer-mesh.vtu"' in (here / "b1" / "run.toml").read_text(encoding="utf-8")
+    said = cli("structure", "--config", "b1/run.toml", "--no-figures", "--out", "again", "--workers", 1)
+    assert said.status == 0, said.err
+    assert (here / "again" / "forces.csv").read_bytes() == (here / "b1" / "forces.csv").read_bytes()
+    said = cli("structure", "run", "--mesh", "block2.vtu", *options, "--finer-mesh", "block1.vtu", "--out", "no")
+    assert (said.status, "finer mesh has 9 quadrilaterals, and the mesh 36" in said.err) == (2, True)
+    assert not (here / "no").exists()
 
 
 @pytest.mark.finite_elements
@@ -177,6 +212,10 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
     ("arguments", "words"),
     [
         ([], ["give the RUN folder of a fit"]),
+        (
+            ["run", "--config", "run.toml"],
+            ["'run.toml' is of a simulation", "leave out --config, or the RUN folder of a fit (run)."],
+        ),
         (["nowhere"], ["no run folder 'nowhere'"]),
         (["run", "--case", "beam"], ["no case named 'beam'", "bar, indentation"]),
         (["run", "--size", "width=3"], ["no size 'width'", "punch_radius=0.75"]),
@@ -198,6 +237,7 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
             ["run", "--mesh", "none.msh", "--move", "ymax=y:1", "--tip-radius", "2"],
             ["--tip-radius goes with --press", "not --move"],
         ),
+        (["run", "--finer-mesh", "fine.msh"], ["--mesh FILE", "--size NAME=VALUE"]),
         (["run", "--case", "sphere", "--tip-radius", "2"], ["--mesh FILE", "--size NAME=VALUE"]),
         (["run", "--case", "bar", "--parts", "2"], ["--mesh FILE", "--size NAME=VALUE"]),
         (["run", "--draws", "1"], ["draws", "greater than or equal to 2"]),

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tissuq.decks import parse_quantity
+from tissuq.decks import Deck, parse_quantity
 from tissuq.decks.abaqus import node_sets
 from tissuq.decks.calculix_results import CalculiXResults, Frd
+from tissuq.decks.deck import deck_formats
+from tissuq.decks.model_run import check_sets
 from tissuq.decks.quantity import Results
 from tissuq.errors import InputError
 
@@ -116,6 +121,54 @@ def test_a_function_that_fails_is_named(results, tmp_path, body, words):
         parse_quantity("q", f"{tmp_path}/mine.py:other").check()
     with pytest.raises(InputError, match="no file"):
         parse_quantity("q", f"{tmp_path}/yours.py:get").check()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "of_nodes", "of_elements"),
+    [
+        ("abaqus", "*NODE, NSET=all nodes\n1, 0.\n*NGEN, NSET=Edge\n1, 2\n*ELSET, ELSET=Disc\n1\n*NODE PRINT, NSET=X\n",
+         {"ALL NODES", "EDGE"}, {"ALL NODES", "EDGE", "DISC"}),
+        ("febio", '<febio_spec><Mesh><Nodes name="body"/><NodeSet name="top">1</NodeSet><Surface name="In"/></Mesh>'
+         "</febio_spec>", {"BODY", "TOP", "IN"}, {"BODY", "TOP", "IN"}),
+        ("ansys", "/PREP7\nCMBLOCK,TOP     ,NODE,       2\n(8i10)\n         1         2\n", {"TOP"}, {"TOP"}),
+        ("ansys", "/PREP7\nCMBLOCK,TOP     ,NODE,       1\n(8i10)\n         1\nCM,REST,NODE\n", set(), set()),
+        ("ls-dyna", "*KEYWORD\n*SET_NODE_LIST\n1\n", set(), set()),
+    ],
+)  # fmt: skip
+def test_the_sets_that_results_can_have_are_known_from_the_deck_or_none_are(name, text, of_nodes, of_elements):
+    kind = deck_formats()[name]()
+    assert kind.set_names([text.encode()], of_elements=False) == of_nodes
+    assert kind.set_names([text.encode()], of_elements=True) == of_elements
+
+
+@pytest.mark.parametrize(
+    ("wanted", "is_known"),
+    [("RF2@TOP", True), ("U@PART-1.TOP", True), ("U@ALL", True), ("U", True), ("S11@BODY", True), ("U@BODY", False),
+     ("MISES@TOPP:max", False)],
+)  # fmt: skip
+def test_a_set_that_a_deck_with_its_included_files_does_not_have_is_refused_before_a_run(tmp_path, wanted, is_known):
+    (tmp_path / "mesh.inp").write_text("*NODE, NSET=TOP\n1, 0.\n*ELEMENT, TYPE=C3D4, ELSET=BODY\n1, 1, 1, 1, 1\n")
+    (tmp_path / "model.inp").write_text("*INCLUDE, INPUT=mesh.inp\n*MATERIAL, NAME=A\n")
+    deck, quantities = Deck.read(tmp_path / "model.inp"), [parse_quantity("q", wanted)]
+    with nullcontext() if is_known else pytest.raises(InputError, match="no set of nodes"):
+        check_sets(deck, quantities)
+    check_sets(replace(deck, outside=("/elsewhere.inp",)), quantities)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "size"),
+    [
+        ("abaqus", "*ELEMENT, TYPE=C3D10\n1, 1,2,3,4,5,6,7\n, 8,9,10\n*ELEMENT, type=s4\n2, 1, 2, 3, 4\n", (1, 3)),
+        ("abaqus", "*ELEMENT, TYPE=CAX4R\n1, 1,2,3,4\n2, 1,2,3,4\n*ELEMENT, TYPE=SPRING1\n3, 1\n", (2, 2)),
+        ("abaqus", "*ELEMENT, TYPE=C3D8\n1, 1,2,3,4,5,6,7,8\n*ELGEN\n1, 10\n", None),
+        ("abaqus", "*NODE\n1, 0.\n", None),
+        ("febio", '<febio_spec><Mesh><Elements type="tet10"><elem id="1">1</elem><elem id="2">1</elem></Elements>'
+         '<Elements type="quad4"><elem id="3">1</elem></Elements></Mesh></febio_spec>', (2, 3)),
+        ("ansys", "/PREP7\n", None),
+    ],
+)  # fmt: skip
+def test_the_number_of_elements_and_their_dimensions_are_known_from_the_deck_or_not(name, text, size):
+    assert deck_formats()[name]().mesh_size([text.encode()]) == size
 
 
 def test_sets_of_nodes_are_those_of_the_manual():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -272,21 +272,70 @@ def test_a_pressure_that_cannot_be_is_refused(tmp_path, name, watch, reason):
         )  # fmt: skip
 
 
-def test_files_that_hold_no_such_mesh_are_refused(tmp_path):
+def test_a_pressure_on_all_of_the_surface_is_refused(tmp_path):
+    cube, hold = fem.Cube(n=3), {"xmin": "xyz"}
+    points, cells = cube.points, [("hexahedron", cube.cells)]
+    outer = np.flatnonzero((np.abs(points - 0.5) == 0.5).any(axis=1))
+    sets = {"BODY": np.arange(len(points)), "SKIN": outer, "OPEN": np.flatnonzero(points[:, 0] < 1)}
+    meshio.Mesh(points, cells, point_sets=sets).write(tmp_path / "cube.inp")
+    for name in ("BODY", "SKIN"):
+        with pytest.raises(InputError, match=f"the set '{name}' holds all points of the surface .* alone"):
+            InflatedBody(str(tmp_path / "cube.inp"), hold, press=name, distance=1.0, watch="xmax")
+    for name in ("OPEN", "zmax"):
+        InflatedBody(str(tmp_path / "cube.inp"), hold, press=name, distance=1.0, watch="xmax")
+
+
+def test_files_that_hold_no_such_mesh_are_refused(tmp_path, capfd):
     (tmp_path / "text.msh").write_text("nothing\n", encoding="utf-8")
     linear = fem.Rectangle(n=2).triangulate()
     meshio.Mesh(linear.points, [("triangle", linear.cells)]).write(tmp_path / "linear.vtu")
     points = np.pad(_meshes()["quad"].points, ((0, 0), (0, 1)))
     points[3, 0] = np.nan
     meshio.Mesh(points, [("quad", _meshes()["quad"].cells)]).write(tmp_path / "nan.vtu")
+    cube = fem.Cube(n=3)
+    written = {suffix: tmp_path / f"cube.{suffix}" for suffix in ("msh", "inp", "vtu")}
+    for file in written.values():
+        meshio.Mesh(cube.points, [("hexahedron", cube.cells)]).write(file)
+    lines = written["inp"].read_text(encoding="utf-8").splitlines(keepends=True)
+    (tmp_path / "gap.inp").write_text("".join(line for line in lines if not line.startswith("5,")), encoding="utf-8")
+    (tmp_path / "cut.msh").write_bytes(written["msh"].read_bytes()[:900])
+    (tmp_path / "cut.vtu").write_bytes(written["vtu"].read_bytes()[:900])
+    (tmp_path / "empty.inp").write_bytes(b"")
+    (tmp_path / "empty.vtu").write_bytes(b"")
+    (tmp_path / "nodes.inp").write_text("".join(lines[:20]), encoding="utf-8")
+    faces = fem.RegionHexahedronBoundary(cube).mesh.cells_faces
+    meshio.Mesh(cube.points, [("quad", faces)]).write(tmp_path / "surface.vtu")
+    meshio.Mesh(cube.points, [("line", faces[:, :2])]).write(tmp_path / "lines.vtu")
+    capfd.readouterr()
     for file, reason in (
-        ("text.msh", "cannot be read as a mesh"),
+        ("text.msh", "cannot be read as a mesh: it is damaged, cut short, or no .msh file. Write it again"),
+        ("cut.msh", "it is damaged, cut short, or no .msh file"),
+        ("cut.vtu", "it is damaged, cut short, or no .vtu file"),
+        ("gap.inp", "elements or sets have the node 5, which it lacks"),
+        ("empty.inp", "is empty: write it again"),
+        ("empty.vtu", "is empty: write it again"),
+        ("nodes.inp", "has no cells: mesh the body"),
+        ("lines.vtu", "has only line: mesh the body"),
+        ("surface.vtu", "only the cells of a surface in space .quad.: mesh the volume"),
         ("nan.vtu", "points whose coordinates are no numbers"),
         ("linear.vtu", r"cells triangle; use one of quad, .*gmsh -order 2"),
         ("none.msh", "none.msh' cannot be read"),
     ):
         with pytest.raises(InputError, match=reason):
             BodyFromFile(str(tmp_path / file), {"ymin": "xy"}, move="ymax", distance=1.0, shape="plane")
+    assert capfd.readouterr() == ("", "")  # what meshio prints is no second message
+
+
+def test_the_mesh_of_a_file_is_read_and_its_cells_are_ordered_once(tmp_path, monkeypatch):
+    orders = []
+    monkeypatch.setattr(np.linalg, "det", lambda corners, det=np.linalg.det: (orders.append(1), det(corners))[1])
+    file = _written(tmp_path / "block.vtu", "hexahedron", mirrored=True)
+    body = BodyFromFile(file, {"ymin": "xyz"}, move="ymax", distance=0.1)
+    assert body.mesh() is body.mesh()
+    assert sum(orders) == 1
+    other = replace(body, axis="z", hold={"zmin": "xyz"}, move="zmax")
+    assert other.mesh().xyz != body.mesh().xyz
+    assert set(vars(body)) == {field.name for field in fields(body)}  # tables of sizes are made of these
 
 
 def test_a_folded_cell_is_refused_with_its_place(tmp_path):

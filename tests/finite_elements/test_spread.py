@@ -7,7 +7,15 @@ import pytest
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_mode
-from tissuq.finite_elements.spread import band_of, band_probability, shares_of, standard_errors
+from tissuq.finite_elements.spread import (
+    band_of,
+    band_probability,
+    force_table,
+    mesh_factor,
+    mesh_free,
+    shares_of,
+    standard_errors,
+)
 
 GENERATOR = np.random.default_rng(0)
 
@@ -43,6 +51,24 @@ def test_without_discrepancy_all_is_due_to_the_parameters():
     parts = [found.parameters, found.discrepancy, found.noise]
     np.testing.assert_allclose(parts, [[1, 1], [0, 0], [0, 0]], rtol=1e-14)
     assert np.isnan(found.correlation).all()
+
+
+def test_the_error_of_the_mesh_is_one_more_share_of_the_variance_of_what_is_corrected():
+    """Against draws that are corrected one by one, with an error of their own of a quarter of the correction."""
+    complete, alone = 5 + GENERATOR.standard_normal((2, 40, 2))
+    factor = mesh_factor(np.array([1.0, 2.0]), [(1.0, -0.1), (2.0, -0.2)], 4.0)
+    assert factor == pytest.approx([1 - 4 / 30, 1 - 8 / 30])
+    table = mesh_free(force_table(np.array([1.0, 2.0]), complete, alone, None, 0.3), factor)
+    scaled = shares_of(factor * complete, factor * alone, 0.3)
+    spread = complete.mean(axis=0) * (1 - factor) / 4
+    own = (factor * complete).var(axis=0, ddof=1) + 0.3**2
+    total = own + spread**2
+    np.testing.assert_allclose(table["mesh"], spread**2 / total)
+    for name in ("parameters", "discrepancy", "noise"):
+        np.testing.assert_allclose(table[name], getattr(scaled, name) * own / total)
+    np.testing.assert_allclose(table[["parameters", "discrepancy", "noise", "mesh"]].sum(axis=1), 1)
+    np.testing.assert_allclose(table["mesh_free_sd"] ** 2, total - 0.3**2)
+    assert (table["mesh_error"] > 0).all()
 
 
 @pytest.mark.parametrize("count", [5, 16, 64, 200])

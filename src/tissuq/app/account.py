@@ -40,6 +40,7 @@ WORDS = {
     "table": "take table {}", "only": "take the rows where {}", "cycle": "take cycle {}", "branch": "take only {}",
     "zero": "displacement counts from {}", "load-zero": "the load counts from {}", "turn": "change the sign of: {}",
     "preload": "the specimen is taut at {}", "strain-type": "it is {} strain", "stress-type": "it is {} stress",
+    "incompressible": "take its volume as constant all the same",
     "until-peak": "leave out what follows the largest stress", "leave-out": "leave out line {}",
     "compression-positive": "compression is positive in the file", "axis": "take axis {}",
     "every": "take every {}th row",

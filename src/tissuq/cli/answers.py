@@ -14,7 +14,7 @@ from tissuq.studies.measured_file import ReadingSettings
 
 __all__ = ["Answer", "answers_in", "options_in", "with_options"]
 
-SWITCHES = {"compression-positive": True, "tension-positive": False, "until-peak": True}
+SWITCHES = {"compression-positive": True, "tension-positive": False, "until-peak": True, "incompressible": True}
 """Options without a value, and what they say."""
 READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
 """How every option of reading is taken, by its name; that which says no stands for the same setting."""

@@ -92,7 +92,13 @@ class Call(Generic[Kind, How]):
 
     def check_source(self, setting: str, what: str, earlier: str) -> None:
         """Refuse a call with neither or both of a source of data, which is a setting, and a file of settings."""
-        if bool(self.stated.get(setting)) == bool(self.config):
+        given = self.stated.get(setting)
+        if given and self.config:
+            raise InputError(
+                f"'{self.config}' is of a {earlier}, and names what that is of: leave out --config, or {what} "
+                f"({_shown(given)})."
+            )
+        if not (given or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
 
     @cached_property
@@ -187,6 +193,11 @@ class Call(Generic[Kind, How]):
                 write(study, folder=folder, figures=self.how.figures)
                 self.monitor.write_log(folder, getattr(study, "warnings", ()))
         return study
+
+
+def _shown(given: Any) -> str:
+    """Return a file, or several, as they were typed."""
+    return " ".join(map(str, given)) if isinstance(given, list | tuple) else str(given)
 
 
 def not_converged(names: list[str]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
@@ -23,6 +23,9 @@ __all__ = ["ensemble"]
 
 POSTERIORS = "posteriors"
 """Folder with a copy of every run that draws come from."""
+
+FREE = frozenset({"quantities", "finer_model", "cell_ratio", "mesh_order"})
+"""Settings that may be others when an ensemble goes on."""
 
 
 class EnsembleOptions(LawOfRun, Configured):
@@ -67,7 +70,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
         print_explanations(prepared.card_warnings)
         return
     stored = _stored(prepared, sources, beside)
-    check_folder(folder, stored, free=frozenset({"quantities"}))
+    check_folder(folder, stored, free=FREE)
     for number, source in enumerate(sources, start=1):
         check_source(beside / source, folder / POSTERIORS / str(number))
     _write_inputs(prepared, stored, sources, beside, folder)
@@ -88,7 +91,12 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
     model = stated.get("model")
     if run is not None and model is None and run.is_file():
         run, model = None, str(run)  # every material has its own run
-    if bool(model) == bool(call.config) or (run and not model):
+    if call.config and (run or model):
+        raise InputError(
+            f"'{call.config}' names the runs and the model of the ensemble that it repeats: leave out --config, or "
+            f"{' '.join(str(each) for each in (run, model) if each)}."
+        )
+    if not (model or call.config):
         raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
     materials = _materials(stated.get("materials", []), run)
     for example, value in (("--replace NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):
@@ -104,14 +112,17 @@ def _stored(prepared: PreparedEnsemble, sources: list[str], beside: Path) -> Ens
     """Return the settings with the names that runs and files have in the folder of the ensemble."""
     from tissuq.decks.model_files import MODEL, stored_place
     from tissuq.report.source_run import SOURCE
+    from tissuq.studies.finer_model import FINER
 
     settings = prepared.settings
     places = {source: f"{POSTERIORS}/{number}/{SOURCE}" for number, source in enumerate(sources, start=1)}
-    changes = {
+    changes: dict[str, Any] = {
         "model": f"{MODEL}/{prepared.deck.main}",
         "materials": {name: places[source] for name, source in settings.materials.items()},
         "also": [stored_place(prepared.deck, beside / file) for file in settings.also],
     }
+    if prepared.finer is not None:
+        changes["finer_model"] = f"{FINER}/{MODEL}/{prepared.finer.deck.main}"
     return settings.model_copy(update=changes)
 
 
@@ -122,9 +133,12 @@ def _write_inputs(
     from tissuq.decks.model_files import copy_model
     from tissuq.report.ensemble import copy_functions
     from tissuq.report.source_run import copy_source
+    from tissuq.studies.finer_model import FINER
 
     folder.mkdir(parents=True, exist_ok=True)
     copy_model(prepared.deck, prepared.settings.also, beside, folder)
+    if prepared.finer is not None:
+        copy_model(prepared.finer.deck, prepared.settings.also, beside, folder / FINER, is_replaced=True)
     for number, source in enumerate(sources, start=1):
         copy_source(beside / source, folder / POSTERIORS / str(number))
     quantities = stored.quantities | copy_functions(prepared.quantities, folder)

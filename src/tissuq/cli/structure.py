@@ -15,6 +15,9 @@ from tissuq.studies.simulation_settings import SimulationSettings
 
 __all__ = ["structure"]
 
+FINER = "finer-mesh"
+"""What the copy of a finer mesh is called."""
+
 
 class StructureOptions(LawOfRun, Configured):
     """How a simulation is carried out."""
@@ -39,13 +42,15 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     settings, beside, law = call.settings, call.beside, call.law
     source = beside / settings.run
     case = settings.sized_case(beside)
-    stored_settings = settings.model_copy(update={"run": SOURCE} | stored_mesh(settings.mesh))
+    finer = settings.finer_case(beside)
+    stored = {"mesh": stored_mesh(settings.mesh), "finer_mesh": stored_mesh(settings.finer_mesh, FINER)}
+    stored_settings = settings.model_copy(update={"run": SOURCE, **stored})
     named = Path(settings.mesh).stem if settings.mesh else case.name
     of_run = beside if call.config else Path(settings.run)
     folder = call.how.out or Path("runs") / f"{of_run.resolve().name}-{named}"
     if not call.config:  # a repeated simulation may continue in its own folder, which holds the run
         check_apart(folder, source)
-    check_folder(folder, stored_settings)
+    check_folder(folder, stored_settings, free=frozenset({"finer_mesh", "mesh_order"}))
     check_source(source, folder)
     check_mesh(case, folder)
     with call.monitor.steps() as step, warnings.catch_warnings(record=True) as raised:
@@ -56,6 +61,7 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
         write_campaign_recipe(folder, stored_settings)
         copy_source(source, folder)
         copy_mesh(case, folder)
+        copy_mesh(finer, folder, FINER)
 
     processes = 1 if law else call.how.workers or os.cpu_count() or 1  # others cannot load a law from a file
     campaign = call.campaign_in(folder)

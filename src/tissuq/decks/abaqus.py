@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, MeshSize, lines_of
 from tissuq.errors import InputError
 
 __all__ = ["AbaqusDeck", "Keyword", "keywords_of"]
@@ -24,6 +24,16 @@ ENDS = {
     "NSET", "ELSET", "SURFACE", "SURFACEINTERACTION", "CONNECTORBEHAVIOR", "BOUNDARY", "AMPLITUDE", "INITIALCONDITIONS",
 }  # fmt: skip
 """Keywords below which no option of a material stands, as well as those of sections."""
+
+ELEMENT = re.compile(r"((?P<solid>C3D)|CAX|CGAX|CPE|CPS|M3D|MAX|S)(?P<nodes>3|4|5|6|8|9|1[05]|2[07])(?!\d)")
+"""Types of elements, and their nodes."""
+NAMES_OF_SETS, NAMES_OF_ELEMENT_SETS = ("NSET", "NEWSET"), ("ELSET",)
+"""Parameters by which keywords name the sets that they make."""
+USERS = {
+    "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE", "CONTACTPRINT",
+    "MONITOR",
+}  # fmt: skip
+"""Keywords that ask for what happens in a set, which another one makes."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +113,25 @@ class AbaqusDeck(DeckFormat):
 
     def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
         return node_sets(files)
+
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        wanted = NAMES_OF_SETS + NAMES_OF_ELEMENT_SETS * of_elements
+        keywords = [keyword for content in files for keyword in keywords_of(content) if keyword.name not in USERS]
+        return {
+            keyword.parameters[name].upper() for keyword in keywords for name in wanted if name in keyword.parameters
+        }
+
+    def mesh_size(self, files: Sequence[bytes]) -> MeshSize | None:
+        counts: dict[int, int] = {}
+        for keyword in (keyword for content in files for keyword in keywords_of(content)):
+            if keyword.name == "ELGEN":
+                return None
+            kind = ELEMENT.match(_joined(keyword.parameters.get("TYPE", ""))) if keyword.name == "ELEMENT" else None
+            if kind is not None:
+                dimensions, row = 3 if kind["solid"] else 2, 1 + int(kind["nodes"])
+                numbers = sum(bool(word.strip()) for line in keyword.data for word in line.split(","))
+                counts[dimensions] = counts.get(dimensions, 0) + numbers // row
+        return MeshSize(counts[max(counts)], max(counts)) if counts else None
 
 
 def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:

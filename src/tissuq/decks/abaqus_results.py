@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Values
+from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Values, unknown_set
 from tissuq.errors import InputError
 
 __all__ = ["AbaqusResults"]
@@ -61,7 +61,7 @@ class AbaqusResults(ResultFile):
         request = f"{kind}@{set_name}"
         fields = self._table((request,))["fields"]
         if request not in fields:
-            raise self.unknown_set(set_name, self.node_sets)
+            raise InputError(unknown_set(set_name, self.node_sets))
         found = fields[request]
         if found is None:
             return None

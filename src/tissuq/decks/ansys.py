@@ -18,6 +18,8 @@ ELASTIC_CONSTANTS = {"EX", "EY", "EZ", "NUXY", "NUYZ", "NUXZ", "PRXY", "PRYZ", "
 REMARKS = ("/COM", "/TITLE", "/STITLE", "C***")
 """What the commands of lines begin with whose words are for readers."""
 DATA = ("TBDATA", "TBDAT", "TBPT", "TBTEMP", "TBTEM", "TBEO", "TBFIELD")
+GROUPING = ("CM", "CMGRP", "CMEDIT", "*USE")
+"""Commands that make components of what is selected, or may."""
 COMPONENT = re.compile(
     rb"^[ \t]*CMBLOCK[ \t]*,(?P<name>[^,\r\n]+),[ \t]*NODE[^,\r\n]*,[ \t]*(?P<count>\d+)[^\r\n]*\r?\n",
     re.IGNORECASE | re.MULTILINE,
@@ -94,6 +96,11 @@ class AnsysDeck(DeckFormat):
                 name, count = decoded(head["name"]).strip().upper(), int(head["count"])
                 sets[name] = _component(name, content[head.end() : head.end() + 99 + LONGEST * count], count)
         return sets
+
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        """Return the components; none where the deck makes some by ``CM``, or has none: they may be in the results."""
+        makes_others = any(words[0] in GROUPING for content in files for _, words in _commands(content))
+        return set() if makes_others else set(self.node_sets(files))
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
         return block

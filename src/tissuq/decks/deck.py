@@ -9,13 +9,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import unified_diff
+from hashlib import sha256
 from pathlib import Path, PurePosixPath
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from tissuq.errors import InputError
 from tissuq.registry import find, variants
 
-__all__ = ["Deck", "DeckFormat", "DeckMaterial", "Line", "deck_formats", "decoded", "encoded", "lines_of"]
+__all__ = ["Deck", "DeckFormat", "DeckMaterial", "Line", "MeshSize", "deck_formats", "decoded", "encoded", "lines_of"]
 
 CONTEXT = 3
 """Lines around a difference that are shown."""
@@ -78,6 +79,13 @@ class DeckMaterial:
         return self.name or self.number
 
 
+class MeshSize(NamedTuple):
+    """The number of elements of most dimensions, and these dimensions."""
+
+    elements: int
+    dimensions: int
+
+
 class DeckFormat(ABC):
     """The input of a finite-element program; a new one is one subclass in one file."""
 
@@ -112,6 +120,17 @@ class DeckFormat(ABC):
             When they are not understood.
         """
         return {}
+
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        """Return the names, in capitals, of all sets that a result file can have; none where these are not known.
+
+        With ``of_elements`` also those of elements, whose stresses some programs write.
+        """
+        return set()
+
+    def mesh_size(self, files: Sequence[bytes]) -> MeshSize | None:
+        """Return the number of elements of most dimensions, and these; None where they are not known."""
+        return None
 
     def matches(self, material: DeckMaterial, wanted: str) -> bool:
         """Return whether a material is the one that is wanted: by its name, whatever its case, or its number."""
@@ -207,6 +226,11 @@ class Deck:
     def job(self) -> str:
         """The name of the main file without folder and suffix."""
         return PurePosixPath(self.main).stem
+
+    @property
+    def digest(self) -> str:
+        """A text that changes with the files, other than those outside."""
+        return sha256(repr(sorted(self.files.items())).encode()).hexdigest()[:24]
 
     def materials(self) -> list[tuple[str, DeckMaterial]]:
         """Return the files with materials in them, each with its material."""

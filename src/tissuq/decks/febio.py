@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from xml.parsers.expat import ExpatError, ParserCreate
 
-from tissuq.decks.deck import DeckFormat, DeckMaterial, decoded
+from tissuq.decks.deck import DeckFormat, DeckMaterial, MeshSize, decoded
 from tissuq.errors import InputError
 
 __all__ = ["FEBioDeck"]
@@ -16,6 +18,10 @@ SHARED = "rigid body"
 
 KEPT = ("density", "mat_axis")
 """What stays of a material; its axes where the card has fibres."""
+SETS = ("Nodes", "NodeSet", "Surface")
+"""Elements whose names are those of sets in the plot file."""
+SOLIDS = ("hex", "HEX", "tet", "TET", "penta", "PENTA", "pyra", "PYRA")
+"""What the types of elements of a volume begin with."""
 FIBRES = "Holzapfel-Gasser-Ogden"
 """The type of cards with fibres."""
 
@@ -40,6 +46,15 @@ class FEBioDeck(DeckFormat):
     def materials(self, content: bytes) -> list[DeckMaterial]:
         return _Parsed(content).materials
 
+    def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
+        return set().union(*(_Parsed(content).sets for content in files))
+
+    def mesh_size(self, files: Sequence[bytes]) -> MeshSize | None:
+        counts = Counter[int]()
+        for content in files:
+            counts.update(_Parsed(content).elements)
+        return MeshSize(counts[max(counts)], max(counts)) if counts else None
+
     def fragment(self, material: DeckMaterial, block: str) -> str:
         head, density, axes = material.remains
         kind = TYPE.search(block.partition(">")[0])
@@ -59,6 +74,9 @@ class _Parsed:
         self.content = content
         self.materials: list[DeckMaterial] = []
         self.includes: list[str] = []
+        self.sets: set[str] = set()
+        self.elements = Counter[int]()
+        self._dimensions = 0
         self._stack: list[str] = []
         self._start = 0
         self._attributes: dict[str, str] = {}
@@ -76,6 +94,12 @@ class _Parsed:
     def _open(self, name: str, attributes: dict[str, str]) -> None:
         if "from" in attributes:
             self.includes.append(attributes["from"])
+        if name == "Elements":
+            self._dimensions = 3 if attributes.get("type", "").startswith(SOLIDS) else 2
+        if name in ("elem", "e") and self._stack[-1:] == ["Elements"]:
+            self.elements[self._dimensions] += 1
+        if name in SETS and "name" in attributes:
+            self.sets.add(attributes["name"].strip().upper())
         if name == "material" and self._stack[-1:] == ["Material"]:
             self._start, self._attributes = self._parser.CurrentByteIndex, attributes
             self._kept = dict.fromkeys(KEPT, (0, 0))

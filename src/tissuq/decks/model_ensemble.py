@@ -11,8 +11,17 @@ from numpy.typing import NDArray
 
 from tissuq.decks.model_run import ModelRun
 from tissuq.errors import ConvergenceError
-from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MIN_DRAWS
-from tissuq.finite_elements.spread import BAND, PROBABILITY, SHARES, band_probability, force_table
+from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, FINE_MESH, MATERIAL_ONLY, MIN_DRAWS
+from tissuq.finite_elements.spread import (
+    BAND,
+    PROBABILITY,
+    SHARES,
+    band_probability,
+    force_table,
+    mesh_factor,
+    mesh_free,
+)
+from tissuq.finite_elements.warnings import MIN_MESH_CHANGE
 from tissuq.posterior.draws_in_words import failed_draws
 from tissuq.posterior.ensemble import Ensemble
 
@@ -27,6 +36,8 @@ TIMES = 41
 """Common times of curves whose solver chose its increments draw by draw."""
 SAME_TIME = 1e-5
 """Relative difference of times that are the same in files with six digits."""
+MIN_VALUE = 1e-3
+"""Share of its largest value from which the relative change of a quantity on a finer mesh is used."""
 MIN_SHARE_BEYOND = 0.02
 """Mean share of elements beyond what was measured from which a warning is given."""
 
@@ -63,6 +74,12 @@ class ModelEnsemble:
         Of all runs of the solver, s.
     sources : mapping of str to (N, k) array
         What the draws of all materials differ by besides parameters and discrepancy, as in `Ensemble.sources`.
+    mesh_changes : mapping of str to tuple of (float, float)
+        By quantity, where a draw was run on a finer mesh: times, and the relative changes on it.
+    finer : float
+        What the error of the mesh is divided by on that.
+    mesh_problem : str
+        Why there are no such changes, though that was asked for.
     """
 
     times: Mapping[str, FloatArray]
@@ -72,6 +89,9 @@ class ModelEnsemble:
     folders: tuple[str, ...]
     seconds: float
     sources: Mapping[str, FloatArray] = field(default_factory=dict)
+    mesh_changes: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    finer: float = 2.0
+    mesh_problem: str = ""
 
     @property
     def draws(self) -> int:
@@ -87,13 +107,21 @@ class ModelEnsemble:
         """Return band and shares of the variance of a quantity at every time: see `spread.force_table`.
 
         The band is that of all complete draws that got there; the shares are those of the draws (``shared_draws``) that
-        got there without their discrepancy, too.
+        got there without their discrepancy, too. Where a draw was run on a finer mesh, with the band for cells without
+        size: see `spread.mesh_free`.
         """
         times, families = self.times[quantity], self.curves[quantity]
         complete = families[COMPLETE]
         table = force_table(times, complete, complete, None, 0.0, "time", self.sources)
-        if not self.is_shared:
-            return table
+        if self.is_shared:
+            table = self._with_shares(table, quantity)
+        changes = self.mesh_changes.get(quantity, ())
+        return mesh_free(table, mesh_factor(times, changes, self.finer)) if changes else table
+
+    def _with_shares(self, table: pd.DataFrame, quantity: str) -> pd.DataFrame:
+        """Return a table with the shares of the draws that are there without their discrepancy, too."""
+        times, families = self.times[quantity], self.curves[quantity]
+        complete = families[COMPLETE]
         shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time", self.sources)
         names = [name for name in (*SHARES, "discrepancy_sd", *(f"alone_{part}" for part in BAND)) if name in shared]
         errors = [f"{name}_error" for name in names if f"{name}_error" in shared]
@@ -106,20 +134,26 @@ class ModelEnsemble:
     @property
     def warnings(self) -> list[str]:
         """Warnings about the result."""
-        return [*_failed(self), *_beyond(self), *_too_few(self)]
+        return [*_failed(self), *_beyond(self), *_too_few(self), *_mesh(self)]
 
 
 def gathered(
-    tasks: Sequence[ModelRun], results: Sequence[Mapping[str, Any]], ensembles: Collection[Ensemble] = ()
+    tasks: Sequence[ModelRun],
+    results: Sequence[Mapping[str, Any]],
+    ensembles: Collection[Ensemble] = (),
+    finer: float = 2.0,
 ) -> ModelEnsemble:
-    """Return the ensemble of runs, with the draws of its materials.
+    """Return the ensemble of runs, with the draws of its materials; one on a finer mesh only tells the error of theirs.
 
     Raises
     ------
     ConvergenceError
         When fewer than two draws give a quantity.
     """
-    pairs = list(zip(tasks, results, strict=True))
+    everything = list(zip(tasks, results, strict=True))
+    pairs = [(task, result) for task, result in everything if task.family != FINE_MESH]
+    fine = next(((task, result) for task, result in everything if task.family == FINE_MESH), None)
+    tasks, results = [task for task, _ in pairs], [result for _, result in pairs]
     families = {task.family: None for task in tasks}
     by_family = {name: [result for task, result in pairs if task.family == name] for name in families}
     times, curves = {}, {}
@@ -138,7 +172,32 @@ def gathered(
         tuple(result["folder"] for result in by_family[COMPLETE] if not result["problem"]),
         sum(float(result["seconds"]) for result in results),
         _sources(ensembles),
+        finer=finer,
+        **(_mesh_changes(*fine, by_family[COMPLETE]) if fine is not None else {}),
     )
+
+
+def _mesh_changes(task: ModelRun, fine: Mapping[str, Any], complete: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the relative changes of quantities of one draw on a finer mesh, or why there are none."""
+    coarse, changes = complete[task.number], {}
+    for name in (quantity.name for quantity in task.quantities):
+        pair = [result["curves"].get(name) or [[], []] for result in (coarse, fine)]
+        if all(times for times, _ in pair):
+            times, (on_mesh, on_finer) = on_common_times(pair)
+            is_known = np.abs(on_mesh) > MIN_VALUE * np.nanmax(np.abs(on_mesh))
+            is_known &= np.isfinite(on_finer)
+            relative = on_finer[is_known] / on_mesh[is_known] - 1
+            changes[name] = tuple(zip(times[is_known].tolist(), relative.tolist(), strict=True))
+    reasons = [(fine, "on the finer mesh"), (coarse, "on the mesh")]
+    problem = next(
+        (
+            f"draw {task.number + 1} {where}: {reason}"
+            for result, where in reasons
+            if (reason := result["problem"] or result["misread"])
+        ),
+        "" if all(changes.values()) and changes else "the quantity is zero",
+    )
+    return {"mesh_changes": changes, "mesh_problem": problem}
 
 
 def _sources(ensembles: Collection[Ensemble]) -> dict[str, FloatArray]:
@@ -218,6 +277,20 @@ def _beyond(ensemble: ModelEnsemble) -> list[str]:
         f"At the end {100 * share:.0f} % of the elements are strained beyond what was measured (I1 or I2). There a "
         "card goes on as its form does, with an error that no number here holds: measure further, or load the model "
         "less."
+    ]
+
+
+def _mesh(ensemble: ModelEnsemble) -> list[str]:
+    if ensemble.mesh_problem:
+        return [
+            f"The error of the mesh is not known up to the end ({ensemble.mesh_problem}): mend the finer model and "
+            "repeat the command with --again."
+        ]
+    ends = {name: changes[-1][1] for name, changes in ensemble.mesh_changes.items()}
+    return [
+        f"On the finer mesh {name} at the end changes by {100 * change:+.1f} %: the mesh is too coarse for it."
+        for name, change in ends.items()
+        if abs(change) >= MIN_MESH_CHANGE
     ]
 
 

@@ -21,8 +21,10 @@ OUTSIDE = "outside.json"
 """Digests of the files with absolute names that the deck includes, which are not copied."""
 
 
-def copy_model(deck: Deck, also: Sequence[str], beside: Path, folder: Path) -> None:
+def copy_model(deck: Deck, also: Sequence[str], beside: Path, folder: Path, *, is_replaced: bool = False) -> None:
     """Copy the files of a model into the folder of an ensemble, or see that they are those that lie there.
+
+    Others that lie there are replaced only if ``is_replaced``.
 
     Raises
     ------
@@ -35,11 +37,14 @@ def copy_model(deck: Deck, also: Sequence[str], beside: Path, folder: Path) -> N
         stored_files = {name: (stored / name).read_bytes() for name in deck.files if (stored / name).is_file()}
         outside = folder / OUTSIDE
         stored_digests = outside.read_text(encoding="utf-8") if outside.is_file() else "{}\n"
-        if (stored_files, stored_digests) != (deck.files, digests) or not all(
+        is_same = (stored_files, stored_digests) == (deck.files, digests) and all(
             (stored / name).is_file() and filecmp.cmp(stored / name, file, False) for name, file in extra.items()
-        ):
+        )
+        if is_same:
+            return
+        if not is_replaced:
             raise InputError(f"'{folder}' holds runs of another model; choose another folder.")
-        return
+        shutil.rmtree(stored)
     scratch = folder / f"{MODEL}.new"
     shutil.rmtree(scratch, ignore_errors=True)
     for name, content in deck.files.items():

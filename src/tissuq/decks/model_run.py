@@ -20,10 +20,11 @@ from tissuq.decks.calculix_results import CalculiXResults
 from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
 from tissuq.decks.quantity import Component, Quantity, Results
+from tissuq.decks.result_file import ALL, unknown_set
 from tissuq.decks.solver import LOG, Solver
 from tissuq.errors import InputError
 
-__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "clear_unfinished", "sets_of"]
+__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "check_sets", "clear_unfinished", "sets_of"]
 
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
@@ -62,6 +63,8 @@ class ModelRun:
         Keep the files of the solver.
     abaqus : str
         The program that opens .odb files; unless given, the first word of the solver's command.
+    mesh : str
+        A digest of the files of the model, where it is another than that of the other runs.
     """
 
     family: str
@@ -78,11 +81,13 @@ class ModelRun:
     retries: int = 0
     keep: bool = True
     abaqus: str = ""
+    mesh: str = ""
 
     @property
     def solver_key(self) -> str:
         """A digest of all that the solver's run depends on."""
-        return _digest(self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
+        parts = (self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
+        return _digest(*parts, *([self.mesh] if self.mesh else []))
 
     @property
     def key(self) -> str:
@@ -92,7 +97,7 @@ class ModelRun:
     @property
     def label(self) -> str:
         """The text shown when the task is done."""
-        return f"draw {self.number + 1}"
+        return f"draw {self.number + 1}{' on the finer mesh' if self.mesh else ''}"
 
     @property
     def deck(self) -> Deck:
@@ -140,6 +145,22 @@ def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
     """
     is_needed = any(isinstance(quantity, Component) for quantity in quantities)
     return deck.format.node_sets(list(deck.files.values())) if is_needed else {}
+
+
+def check_sets(deck: Deck, quantities: Iterable[Quantity]) -> None:
+    """Refuse a quantity of a set that the deck does not have, where all of its sets are known.
+
+    Raises
+    ------
+    InputError
+        When there is one.
+    """
+    for quantity in quantities if not deck.outside else ():
+        if isinstance(quantity, Component) and quantity.set_name != ALL:
+            of_elements = quantity.kind in ("S", "E")
+            known = deck.format.set_names(list(deck.files.values()), of_elements=of_elements)
+            if known and quantity.set_name.rpartition(".")[2] not in known:  # those of instances are PART-1-1.TOP
+                raise InputError(f"{quantity.text}: {unknown_set(quantity.set_name, known)}")
 
 
 def _digest(*parts: object) -> str:

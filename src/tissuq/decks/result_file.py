@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, NamedTuple
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.registry import plugins, variants
 
-__all__ = ["ALL", "TENSOR", "ResultFile", "Results", "Values", "result_files"]
+__all__ = ["ALL", "TENSOR", "ResultFile", "Results", "Values", "result_files", "unknown_set"]
 
 FloatArray = NDArray[np.float64]
 
@@ -23,6 +24,9 @@ ALL = "ALL"
 """The set of all nodes, where none is named."""
 TENSOR = ("11", "22", "33", "12", "13", "23")
 """Components of a tensor, in their order."""
+
+MOST_NAMES = 20
+"""Sets that a message lists."""
 
 
 class Values(NamedTuple):
@@ -145,14 +149,18 @@ class ResultFile(ABC):
     def _rows(self, set_name: str) -> NDArray[np.bool_]:
         members = self.node_sets.get(set_name)
         if members is None and set_name != ALL:
-            raise self.unknown_set(set_name, self.node_sets)
+            raise InputError(unknown_set(set_name, self.node_sets))
         rows = np.isin(self.nodes, list(members)) if members is not None else np.ones(len(self.nodes), dtype=bool)
         if not rows.any():
             raise InputError(f"no node of the set '{set_name}' is in {self.label}.")
         return rows
 
-    @staticmethod
-    def unknown_set(set_name: str, known: Collection[str]) -> InputError:
-        """Return what is raised where a set is not known."""
-        names = ", ".join(sorted(known)) or "none"
-        return InputError(f"the model has no set of nodes '{set_name}'; its sets are {names}.")
+
+def unknown_set(set_name: str, known: Collection[str]) -> str:
+    """Return what is said of a set that is none of those known: the nearest names, and some of the others."""
+    near = get_close_matches(set_name, known, n=3)
+    hint = f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
+    names = sorted(known)
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    listed = f"{', '.join(names[:MOST_NAMES]) or 'none'}{more}"
+    return f"the model has no set of nodes '{set_name}'; its sets are {listed}.{hint}"

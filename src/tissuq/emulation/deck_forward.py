@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tissuq.decks import Deck, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_files import MODEL, copy_model, extra_files
-from tissuq.decks.model_run import ModelRun, carried_out, clear_unfinished, sets_of
+from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, sets_of
 from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material
@@ -171,6 +171,7 @@ class DeckForward(Forward):
         extra_files(self.read_deck, self.also, Path())
         for quantity in self.quantities:
             quantity.check()
+        check_sets(self.read_deck, self.quantities)
         sets_of(self.read_deck, self.quantities)
         if not all(np.isfinite(factor) and factor for factor in (*self.factors.values(), self.along_factor)):
             raise InputError("a factor of a quantity must be a number other than zero.")

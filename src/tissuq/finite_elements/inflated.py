@@ -8,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import FloatArray, Inflation, Supports
+from tissuq.finite_elements.case import FloatArray, Inflation, Mesh, Supports
+from tissuq.finite_elements.library import region_of
 from tissuq.finite_elements.mesh_file import AXES, BodyFromFile
 
 __all__ = ["InflatedBody"]
@@ -55,6 +56,18 @@ class InflatedBody(BodyFromFile):
         mesh, _ = self._mesh_and_sets()
         if mesh.kind.meshio in WITHOUT_PRESSURE:
             raise InputError(f"a pressure cannot act on {mesh.kind.plural}; use quadrilaterals or hexahedra.")
+        self._check_faces(mesh)
+
+    def _check_faces(self, mesh: Mesh) -> None:
+        """Refuse a set that has every face of the surface: a pressure all around only squeezes."""
+        region = region_of(mesh, "Boundary", ensure_3d=not mesh.is_solid)
+        if len(np.setdiff1d(region.mesh.cells_faces, self._found().sets[self.press])):
+            return
+        raise InputError(
+            f"the set '{self.press}' holds all points of the surface of '{self.file}', so that the pressure would act "
+            "all around the body: give --inflate the set of the points of the pressed faces alone, as a physical group "
+            f"of Gmsh or an *NSET; the sets are {', '.join(sorted(self._found().sets))}."
+        )
 
     def _check_pressed(self) -> None:
         axes = AXES[: self._found().points.shape[1]]

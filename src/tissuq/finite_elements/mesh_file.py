@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
+from functools import lru_cache
 from hashlib import sha256
 from io import StringIO
 from math import inf
@@ -63,16 +64,32 @@ def read_mesh(path: Path) -> MeshFile:
     """
     import meshio
 
+    if path.is_file() and not path.stat().st_size:
+        raise InputError(f"the mesh '{path}' is empty: write it again with the program that made it.")
+    said = StringIO()
     try:
-        with redirect_stdout(StringIO()):
+        with redirect_stdout(said), redirect_stderr(said):
             is_deck = path.suffix.lower() == ".inp"
             found = meshio.read(StringIO(_deck_text(path)), "abaqus") if is_deck else meshio.read(path)
     except OSError as error:
-        raise InputError(f"'{path}' cannot be read: {error.strerror or error}.") from error
+        raise InputError(f"the mesh '{path}' cannot be read: {error.strerror or error}.") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever a damaged file leads to, or exit
-        reason = str(error) if not isinstance(error, SystemExit) else "it is none of the formats that its name says"
-        raise InputError(f"'{path}' cannot be read as a mesh ({reason or type(error).__name__}).") from error
+        raise InputError(f"'{path}' cannot be read as a mesh: {_why_unreadable(path, error)}") from error
     return _used(path, found)
+
+
+def _why_unreadable(path: Path, error: BaseException) -> str:
+    """Return what is wrong with a file that meshio's reader failed at, and what to do, as sentences."""
+    again, reason = "Write it again with the program that made it", str(error)
+    if "deduce file format" in reason:
+        return f"no format of meshes is known by the name '{path.suffix}'. {again}, as .msh, .inp or .vtu."
+    if "Element type not available" in reason:
+        return f"its elements '{reason.rpartition(' ')[2]}' are not known. {again}, with elements such as C3D8."
+    if isinstance(error, KeyError) and isinstance(error.args[0], int | np.integer):
+        return f"its elements or sets have the node {error.args[0]}, which it lacks. {again}, with all nodes."
+    if isinstance(error, ValueError) and "include each other" in reason:
+        return "its files include each other. Take out one *INCLUDE."
+    return f"it is damaged, cut short, or no {path.suffix} file. {again}."
 
 
 def _deck_text(path: Path, depth: int = 0) -> str:
@@ -87,24 +104,33 @@ def _deck_text(path: Path, depth: int = 0) -> str:
 def _used(path: Path, found: Any) -> MeshFile:
     """Return the cells with most dimensions, the points that they use, and the sets among these."""
     names = {kind.meshio: dimensions for (dimensions, _), kind in CELL_KINDS.items()}
-    blocks = [block for block in found.cells if block.dim == max(block.dim for block in found.cells)]
+    highest = max((block.dim for block in found.cells if len(block)), default=0)
+    blocks = [block for block in found.cells if block.dim == highest and len(block)]
     kinds = sorted({block.type for block in blocks})
+    known = ", ".join(names)
+    if highest < 2:
+        has = f"only {', '.join(kinds)}" if kinds else "no cells"
+        raise InputError(f"'{path}' has {has}: mesh the body, and save its cells ({known}).")
+    used = np.unique(np.concatenate([block.data.ravel() for block in blocks])).astype(np.intp)
+    if used[0] < 0 or used[-1] >= len(found.points):
+        raise InputError(f"'{path}' has cells with points that it does not hold; write the mesh again.")
+    if highest == 2 and _is_in_space(np.asarray(found.points, dtype=np.float64)[used]):
+        raise InputError(
+            f"'{path}' has only the cells of a surface in space ({', '.join(kinds)}): mesh the volume, too, and save "
+            "its cells (gmsh -3 -order 2); a plane or axisymmetric body lies in the x-y plane."
+        )
     if len(kinds) != 1 or kinds[0] not in names:
-        known = ", ".join(names)
         linear = " Make triangles and tetrahedra of second order (gmsh -order 2)." * bool(
             {"triangle", "tetra"} & {*kinds}
         )
-        raise InputError(f"'{path}' has cells {', '.join(kinds) or 'of no kind'}; use one of {known}.{linear}")
+        raise InputError(f"'{path}' has cells {', '.join(kinds)}; use one of {known}.{linear}")
     cells = np.concatenate([block.data for block in blocks]).astype(np.intp)
-    used, cells = np.unique(cells, return_inverse=True)
-    cells = cells.reshape(len(cells.ravel()) // blocks[0].data.shape[1], -1)
+    cells = np.searchsorted(used, cells)
     dimensions = names[kinds[0]]
     points = np.asarray(found.points, dtype=np.float64)[used]
     if not np.isfinite(points).all():
         raise InputError(f"'{path}' has points whose coordinates are no numbers; write the mesh again.")
     size = float(np.ptp(points, axis=0).max())
-    if points[:, dimensions:].size and np.ptp(points[:, dimensions:], axis=0).max() > NEARLY * size:
-        raise InputError(f"'{path}' has plane cells in space; they must lie in the x-y plane.")
     points = points[:, :dimensions]
     numbers = np.full(len(found.points), -1)
     numbers[used] = np.arange(len(used))
@@ -115,6 +141,12 @@ def _used(path: Path, found: Any) -> MeshFile:
         for end, value in (("min", points[:, axis].min()), ("max", points[:, axis].max()))
     }
     return MeshFile(points, cells, ends | {name: members[members >= 0] for name, members in sets.items()})
+
+
+def _is_in_space(points: FloatArray) -> bool:
+    """Return whether points (n, 2 or 3) are not all in a plane of the same z."""
+    sizes = np.ptp(points, axis=0)
+    return bool(len(sizes) > 2 and sizes[2] > NEARLY * sizes.max())
 
 
 def _sets(found: Any) -> Iterator[tuple[str, NDArray[np.intp]]]:
@@ -273,16 +305,7 @@ class BodyFromFile(Case):
         return _read_once(self.file, self.digest)
 
     def _mesh_and_sets(self) -> tuple[Mesh, Mapping[str, NDArray[np.intp]]]:
-        found, columns = self._found(), self._columns
-        points = found.points[:, columns]
-        is_half = self.shape == "axisymmetric"
-        xyz = tuple(columns.index(axis) for axis in range(len(columns)))
-        mesh = Mesh(points, found.cells, self.shape == "plane", is_half, xyz)
-        ends, order = map(list, ORIENTATIONS[mesh.kind.meshio])
-        corners = points[found.cells]
-        turned = np.linalg.det(corners[:, ends] - corners[:, :1]) < 0
-        cells = np.where(turned[:, None], found.cells[:, order], found.cells)
-        return mesh._replace(cells=cells), found.sets
+        return _mesh_once(self.file, self.digest, self._columns, self.shape), self._found().sets
 
     def _check_cells(self) -> None:
         """Refuse cells that are folded or have no volume."""
@@ -350,15 +373,26 @@ class BodyFromFile(Case):
             )
 
 
-_READ: dict[str, MeshFile] = {}
-
-
+@lru_cache(maxsize=1)
 def _read_once(file: str, digest: str) -> MeshFile:
-    """Return the mesh of a file whose content has this digest; it is read once a process."""
-    if digest not in _READ:
-        _READ.clear()
-        _READ[digest] = read_mesh(Path(file))
-    return _READ[digest]
+    """Return the mesh of a file whose content has this digest; the last one is kept."""
+    return read_mesh(Path(file))
+
+
+@lru_cache(maxsize=1)
+def _mesh_once(file: str, digest: str, columns: tuple[int, ...], shape: str) -> Mesh:
+    """Return the mesh of a file with these coordinates of it, and with cells that are no mirror images."""
+    found = _read_once(file, digest)
+    points = found.points[:, columns]
+    xyz = tuple(columns.index(axis) for axis in range(len(columns)))
+    mesh = Mesh(points, found.cells, shape == "plane", shape == "axisymmetric", xyz)
+    ends, order = map(list, ORIENTATIONS[mesh.kind.meshio])
+    corners = points[found.cells]
+    turned = np.linalg.det(corners[:, ends] - corners[:, :1]) < 0
+    cells = np.where(turned[:, None], found.cells[:, order], found.cells)
+    for shared in (points, cells):
+        shared.setflags(write=False)
+    return mesh._replace(cells=cells)
 
 
 def _rigid_motions(points: FloatArray, shape: str) -> FloatArray:

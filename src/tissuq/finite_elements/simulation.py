@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.finite_elements.case import Case
+from tissuq.finite_elements.case import Case, Mesh
 from tissuq.finite_elements.first_order import controlled, draws_in_full, first_order_forces
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.response import BULK_RATIO, Run, Solve, run_in_turn
-from tissuq.finite_elements.spread import force_table
+from tissuq.finite_elements.spread import force_table, mesh_factor, mesh_free
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.posterior.posterior import Posterior
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COMPLETE",
     "FAMILIES",
+    "FINE_MESH",
     "MATERIAL_ONLY",
     "WITHOUT",
     "Failure",
@@ -43,6 +44,8 @@ FAMILIES = {
     "without": "draws of the fit without discrepancy",
 }
 """The families in words, by their names."""
+TWICE = 2.0
+"""How many times smaller the cells of the finer mesh of a case are."""
 MIN_DRAWS = 2
 """Smallest number of draws that must reach the first step."""
 
@@ -80,13 +83,17 @@ class Simulation:
     noise_sd : float
         Standard deviation of a new measurement of the force, N.
     mesh_change : (float, float) or None
-        Relative change of the force of one draw on a mesh of twice the fineness, and the travel (mm) at which.
+        Relative change of the force of one draw on a finer mesh, and the travel (mm) at which.
     seconds : float
         Computing time of all draws on one processor, s.
     mesh_changes : tuple of (float, float)
         The same at every travel at which there is one: the travel (mm), and the relative change of the force.
     first_order_error : mapping of str to (s,) array
         By family of which not all draws were computed in full: relative error of the force of one that was not.
+    mesh_ratio : float
+        How many times smaller the cells of the finer mesh are.
+    mesh_order : float
+        Power of their size with which the error falls.
     """
 
     case: Case
@@ -103,6 +110,8 @@ class Simulation:
     seconds: float
     mesh_changes: tuple[tuple[float, float], ...] = ()
     first_order_error: Mapping[str, FloatArray] = field(default_factory=dict)
+    mesh_ratio: float = TWICE
+    mesh_order: float = 1.0
 
     @property
     def in_full(self) -> NDArray[np.bool_]:
@@ -118,28 +127,24 @@ class Simulation:
         Strains are singular at the edge of a punch and at a clamp, so that errors halve with the cells; in a body
         without sharp edges they fall to a quarter (`Case.mesh_order`).
         """
-        if not self.mesh_changes:
-            return np.ones(len(self.travel))
-        finer = 2.0**self.case.mesh_order
-        return np.asarray(1 + finer / (finer - 1) * np.interp(self.travel, *np.transpose(self.mesh_changes)))
+        return mesh_factor(self.travel, self.mesh_changes, self.mesh_ratio**self.mesh_order)
+
+    @property
+    def finer_mesh(self) -> str:
+        """What the finer mesh is, as in a sentence."""
+        return f"a mesh of {'twice' if self.mesh_ratio == TWICE else f'{self.mesh_ratio:.3g} times'} the fineness"
 
     def table(self) -> pd.DataFrame:
         """Return band and shares of the variance at every step, N: see `tissuq.finite_elements.spread.force_table`.
 
-        Where a finer mesh was computed, also the band for cells without size (``mesh_free_...``); a quarter of that
-        correction is taken as the standard deviation of its error.
+        Where a finer mesh was computed, also the band for cells without size, and the share of its error: see
+        `tissuq.finite_elements.spread.mesh_free`.
         """
         complete = self.forces[COMPLETE]
         material_only, without = self.forces.get(MATERIAL_ONLY, complete), self.forces.get(WITHOUT)
         sources, column = self.ensembles[COMPLETE].sources, self.case.travel_column
         table = force_table(self.travel, complete, material_only, without, self.noise_sd, column, sources)
-        if self.mesh_changes:
-            middle, spread = table["mean"] * self.mesh_factor, table["mean"] * np.abs(self.mesh_factor - 1) / 4
-            table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * self.mesh_factor, spread)
-            for end in ("low", "high"):
-                apart = np.hypot((table[end] - table["mean"]) * self.mesh_factor, 2 * spread)
-                table[f"mesh_free_{end}"] = middle + (apart if end == "high" else -apart)
-        return table
+        return mesh_free(table, self.mesh_factor) if self.mesh_changes else table
 
     @property
     def median_draw(self) -> EnergyDraw:
@@ -161,6 +166,8 @@ def simulate(
     force_noise: float | None = None,
     bulk_ratio: float = BULK_RATIO,
     check_mesh: bool = True,
+    finer: Case | None = None,
+    mesh_order: float | None = None,
     full_runs: int | None = None,
     shares: bool = True,
     run: Run = run_in_turn,
@@ -186,6 +193,10 @@ def simulate(
         Bulk modulus in initial shear moduli.
     check_mesh : bool
         Compute one draw on a mesh of twice the fineness, too, where the case has a fineness.
+    finer : Case, optional
+        The same with smaller cells, on which one draw is computed instead.
+    mesh_order : float, optional
+        Power of the size of cells with which the error of the mesh falls; unless given, that of the case.
     full_runs : int, optional
         Draws of every family that are computed in full; the others follow from the deformation of the one in the middle
         to first order, corrected by those (`tissuq.finite_elements.first_order`). Unless given, all.
@@ -231,8 +242,10 @@ def simulate(
     }
     in_full = {name: draws_in_full(first_order, full_runs or 0) for name, first_order in followed.items()}
     wanted = [members[n] for name, members in tasks.items() for n in in_full.get(name, range(len(members)))]
-    if check_mesh and hasattr(case, "fineness"):
-        finer = replace(case, **{"fineness": 2 * case.fineness})
+    mesh_ratio = TWICE if finer is None else _ratio(case.mesh(), finer.mesh())
+    if finer is None and check_mesh and hasattr(case, "fineness"):
+        finer = replace(case, **{"fineness": TWICE * case.fineness})
+    if finer is not None:
         fine_steps = 2 if steps % 2 == 0 else steps
         tasks[FINE_MESH] = [Solve.of(finer, _median_draw(ensembles[COMPLETE]), fine_steps, bulk_ratio, max_invariants)]
     results = _results_by_key([*tasks.get(FINE_MESH, []), *wanted], run)
@@ -261,7 +274,20 @@ def simulate(
         seconds=sum(result["seconds"] for result in results.values()),
         mesh_changes=mesh_changes,
         first_order_error=errors,
+        mesh_ratio=mesh_ratio,
+        mesh_order=case.mesh_order if mesh_order is None else mesh_order,
     )
+
+
+def _ratio(mesh: Mesh, finer: Mesh) -> float:
+    """Return how many times smaller the cells of a finer mesh are, by their numbers."""
+    counts, dimensions = (len(mesh.cells), len(finer.cells)), mesh.points.shape[1]
+    if finer.kind != mesh.kind or counts[1] <= counts[0]:
+        raise InputError(
+            f"the finer mesh has {counts[1]} {finer.kind.plural}, and the mesh {counts[0]} {mesh.kind.plural}: give "
+            "smaller cells of the same kind."
+        )
+    return float((counts[1] / counts[0]) ** (1 / dimensions))
 
 
 def noise_share(posterior: Posterior) -> float:

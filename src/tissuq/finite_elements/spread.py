@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,8 @@ __all__ = [
     "band_of",
     "band_probability",
     "force_table",
+    "mesh_factor",
+    "mesh_free",
     "parts_of",
     "shares_of",
     "standard_errors",
@@ -199,6 +201,8 @@ def standard_errors(
     }
 
 
+PARTS_OF_CORRECTION = 4
+"""The correction for the mesh in standard deviations of its error."""
 BAND = ("mean", "sd", "low", "high")
 SOURCES = ("parameters", "discrepancy", "extrapolation", "test_scale")
 """What the variance of draws may be due to."""
@@ -254,6 +258,58 @@ def force_table(
                 row |= {f"{name}_{key}": float(getattr(band_of(values[:, None]), key)[0]) for key in BAND}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def mesh_factor(at: FloatArray, changes: Sequence[tuple[float, float]], finer: float) -> FloatArray:
+    """Return what a quantity is to be multiplied by at travels or times (s,) for cells without size (Richardson).
+
+    Parameters
+    ----------
+    at : (s,) array
+    changes : sequence of (float, float)
+        Travels or times, rising, and the relative changes of the quantity on a finer mesh there.
+    finer : float
+        What the error is divided by on that: the ratio of the sizes of cells, to the power of the order of convergence.
+
+    Examples
+    --------
+    >>> mesh_factor(np.array([0.5, 1.0]), [(0.5, -0.01), (1.0, -0.02)], 2.0).tolist()
+    [0.98, 0.96]
+    """
+    if not changes:
+        return np.ones(len(at))
+    return np.asarray(1 + finer / (finer - 1) * np.interp(at, *np.transpose(changes)))
+
+
+def mesh_free(table: pd.DataFrame, factor: FloatArray) -> pd.DataFrame:
+    """Return a table with the band for cells without size, too, and with the share of the variance that the mesh has.
+
+    A quarter of the correction is taken as the standard deviation of its error, the same for all draws and independent
+    of them: its variance is the part of the ``mesh``, beside which the other shares become less.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Of `force_table`.
+    factor : (s,) array
+        Of `mesh_factor`.
+    """
+    table, spread = table.copy(), table["mean"].abs() * np.abs(factor - 1) / PARTS_OF_CORRECTION
+    middle = table["mean"] * factor
+    table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * factor, spread)
+    for end in ("low", "high"):
+        apart = np.hypot((table[end] - table["mean"]) * factor, 2 * spread)
+        table[f"mesh_free_{end}"] = middle + (apart if end == "high" else -apart)
+    on_mesh = table["sd"] ** 2 / (1 - table["noise"])
+    noise = on_mesh * table["noise"]
+    total = table["mesh_free_sd"] ** 2 + noise
+    for name in (*SOURCES, "noise"):
+        for column in {name, f"{name}_error"} & {*table}:
+            table[column] *= on_mesh / total * (1.0 if name == "noise" else factor**2)
+    table["mesh"] = spread**2 / total
+    varying = (1 - table["mesh"]) * table["sd_error"] / table["sd"]
+    table["mesh_error"] = 2 * table["mesh"] * np.hypot(table["mean_error"] / table["mean"], varying)
+    return table
 
 
 def _reached(values: FloatArray | None, step: int) -> FloatArray:

@@ -8,7 +8,7 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY,
 from tissuq.finite_elements.spread import PROBABILITY, band_probability, shares_of
 from tissuq.posterior.draws_in_words import failed_draws
 
-__all__ = ["simulation_warnings"]
+__all__ = ["MIN_MESH_CHANGE", "simulation_warnings"]
 
 MIN_ENERGY_SHARE = 0.05
 """Share of the strain energy beyond the measured invariants from which a warning is given."""
@@ -86,6 +86,6 @@ def _coarse_mesh(simulation: Simulation) -> list[str]:
         return []
     change, travel = simulation.mesh_change
     return [
-        f"On a mesh of twice the fineness the {simulation.case.response} at {simulation.case.shown(travel)} "
+        f"On {simulation.finer_mesh} the {simulation.case.response} at {simulation.case.shown(travel)} "
         f"changes by {100 * change:+.1f} %: the mesh is too coarse for it."
     ]

@@ -19,7 +19,7 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
-from tissuq.report.simulation_figures import LABELS, of_sources, shares_in
+from tissuq.report.simulation_figures import LABELS, is_mesh_free, of_sources, prefix_of, shares_in
 from tissuq.report.tables import significant
 from tissuq.studies.ensemble import EnsembleStudy
 from tissuq.studies.ensemble_files import DRAWS
@@ -39,6 +39,10 @@ SHARES = (
     "Q is the quantity of a draw with its discrepancy, Q0 that of the same draw with its material parameters alone. "
     "**Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0); they add up to 100 % of Var Q, and a share below "
     "zero says that the two compensate each other."
+)
+OF_MESH = (
+    "**Mesh** is the variance of the error of the correction for the size of the elements; other shares are of what "
+    "is left."
 )
 STATES = (
     "Left: I1 − 3 and I2 − 3 of the elements at the end (of F / J^(1/3), mean over the nodes), all draws together; "
@@ -85,7 +89,8 @@ def ensemble_result(study: EnsembleStudy, folder: Path) -> Result:
         next_step=_next_step(study),
         picture=Picture("answer", lambda: band_over_time(result, first), f"Band of {first} over time",
                         f"{first}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
-        tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end"),),
+        tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
+                      note=_of_mesh(study, tables)),),
         sections=_sections(study, tables, figures, has_states=bool(fields) and bool(len(fields[0].invariants)),
                            has_fields=has_fields),
         warnings=tuple(study.warnings),
@@ -97,10 +102,8 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
     """Return every quantity at the end with its band, and the largest share of the variance of the first."""
     percent, numbers = _headers(study, tables)[4], []
     for name, table in list(tables.items())[:MAX_NUMBERS]:
-        row = _last(table)
-        numbers.append(
-            Number(f"{name} at the end", row["mean"], row["low"], row["high"], interval_is=f"{percent} band")
-        )
+        mean, _, low, high = _band(_last(table))
+        numbers.append(Number(f"{name} at the end", mean, low, high, interval_is=f"{percent} band"))
     row = _last(next(iter(tables.values())))
     first = next(iter(tables.values()))
     shares = {name: row[name] for name in shares_in(first, is_shared=study.result.is_shared)}
@@ -149,6 +152,7 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
             "model": prepared.settings.model,
             "materials": list(prepared.ensembles),
             "solver": prepared.solver.name,
+            "finer_model": _finer(study),
             "draws": result.draws,
             "failed": sum(failure.family == COMPLETE for failure in result.failures),
             "quantities": {name: _plain(_last(table)) for name, table in tables.items()},
@@ -166,6 +170,18 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
     for name, cards in prepared.cards[COMPLETE].items():
         files[f"cards-{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}.csv"] = [dict(row) for row in cards.index]
     return files
+
+
+def _finer(study: EnsembleStudy) -> dict[str, Any] | None:
+    """Return what is assumed of the mesh, and the relative changes at the end of quantities on a finer one."""
+    finer = study.prepared.finer
+    if finer is None:
+        return None
+    changes = {name: changes[-1][1] for name, changes in study.result.mesh_changes.items() if changes}
+    return {
+        "model": study.prepared.settings.finer_model, "draw": finer.number + 1, "cell_ratio": finer.ratio,
+        "mesh_order": finer.order, "elements": finer.counts, "changes": changes,
+    }  # fmt: skip
 
 
 def _draw_rows(study: EnsembleStudy) -> list[dict[str, Any]]:
@@ -210,16 +226,39 @@ def _plain(row: dict[str, Any]) -> dict[str, Any]:
 def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]:
     percent = f"{100 * band_probability(max(int(table['draws'].max()) for table in tables.values())):.0f} %"
     shares = shares_in(next(iter(tables.values())), is_shared=study.result.is_shared)
-    return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)]
+    first = next(iter(tables.values()))
+    return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)] + (
+        ["on this mesh"] * is_mesh_free(first)
+    )
 
 
 def _row(study: EnsembleStudy, row: dict[str, Any]) -> list[str]:
-    cells = [f"{row['time']:.4g}", str(int(row["draws"])), significant(row["mean"]), significant(row["sd"])]
-    cells.append(f"{significant(row['low'])} to {significant(row['high'])}")
+    mean, sd, low, high = map(significant, _band(row))
+    cells = [f"{row['time']:.4g}", str(int(row["draws"])), mean, sd, f"{low} to {high}"]
     for name in shares_in(row, is_shared=study.result.is_shared):
         share, error = row[name], row[f"{name}_error"]
         cells.append("" if np.isnan(share) else f"{100 * share:.0f} ± {100 * error:.0f} %")
-    return cells
+    return [*cells, *[significant(row["mean"])] * is_mesh_free(row)]
+
+
+def _band(row: dict[str, Any]) -> list[float]:
+    """Return mean, sd and ends of the band that is shown: that for cells without size, where there is one."""
+    return [row[f"{prefix_of(row)}{name}"] for name in ("mean", "sd", "low", "high")]
+
+
+def _of_mesh(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
+    """Return what was done for the size of the elements, in sentences; nothing where nothing was."""
+    finer = study.prepared.finer
+    corrected = {name: _last(table) for name, table in tables.items() if is_mesh_free(table)}
+    if finer is None or not corrected:
+        return ""
+    sizes = ", ".join(
+        f"{name} {100 * (row['mesh_free_mean'] / row['mean'] - 1):+.1f} %" for name, row in corrected.items()
+    )
+    return (
+        f"For elements without size (Richardson): at the end {sizes} beside this mesh, of which a quarter is taken as "
+        f"the sd of its error, within the band. {finer.words}"
+    )
 
 
 def _sections(
@@ -238,6 +277,7 @@ def _sections(
     ]
     if shares_in(first := next(iter(tables.values())), is_shared=result.is_shared):
         sentences = (*[SHARES] * result.is_shared, *[of_sources(first)] * bool(result.sources))
+        sentences += (OF_MESH,) * is_mesh_free(first)
         sections.append(Section("Sources of uncertainty", sentences))
     materials = [
         [name, ensemble.model.experiment.name, ensemble.model.material.name, ensemble.model.discrepancy.name,
@@ -258,6 +298,7 @@ def _sections(
             for item in result.failures
         )
         sections.append(Section("Draws that failed", failures))
+    is_meshed = bool(_of_mesh(study, tables))
     stored = " `fields.vtu` holds mean and standard deviation of the fields at the end for ParaView." * has_fields
     computed = (
         f"{result.draws} draws of the posterior, the same and in the same order as `tissuq export` writes. Solver: "
@@ -266,7 +307,9 @@ def _sections(
         *prepared.card_warnings,
         "Where the solver chose its increments draw by draw, curves are interpolated linearly between them; values at "
         "the end are its own.",
-        f"The error of the model's mesh, of its loads and of its supports is in no number here.{stored}",
+        f"The error of the model's {'' if is_meshed else 'mesh, of its '}loads and of its supports is in no number "
+        f"here.{stored}",
+        *[_of_mesh(study, tables)] * is_meshed,
     )
     changed = prepared.diff().encode("utf-8", "replace").decode()
     deck = Section("What was changed in the deck, for the first draw", (Preformatted(changed),))
@@ -298,8 +341,6 @@ def _lead(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
     sentences = []
     for name, table in tables.items():
         row = _last(table)
-        sentences.append(
-            f"At time {row['time']:.4g}, {name} is {significant(row['mean'])} ({percent}: {significant(row['low'])} to "
-            f"{significant(row['high'])})."
-        )
+        mean, _, low, high = map(significant, _band(row))
+        sentences.append(f"At time {row['time']:.4g}, {name} is {mean} ({percent}: {low} to {high}).")
     return " ".join(sentences)

@@ -16,7 +16,7 @@ from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.simulation_figures import SHARES as ALL_SHARES
-from tissuq.report.simulation_figures import draw_shares, shares_in
+from tissuq.report.simulation_figures import draw_shares, mesh_ratio, prefix_of, shares_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,8 +55,9 @@ def _draw_band(axis: Axes, table: pd.DataFrame, name: str) -> None:
     """Draw mean and band of a quantity over time; of a single time as an interval."""
     time, percent = table["time"], f"{100 * band_probability(int(table['draws'].max())):.0f} %"
     is_path = len(table) > 1
-    pieces.band(axis, time, table["low"], table["high"], strength=0.25, label=percent, is_path=is_path)
-    pieces.line(axis, time, table["mean"], label="mean", is_path=is_path)
+    mean, low, high = (table[f"{prefix_of(table)}{column}"] for column in ("mean", "low", "high"))
+    pieces.band(axis, time, low, high, strength=0.25, label=percent, is_path=is_path)
+    pieces.line(axis, time, mean, label="mean", is_path=is_path)
     axis.set_xlabel("time")
     axis.set_title(name)
     axis.legend(fontsize=9)
@@ -72,7 +73,7 @@ def _quantity(ensemble: ModelEnsemble, name: str) -> Figure:
     axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
     table = table[table["draws"] > 1]
     _draw_band(axes[0], table, name)
-    last = ensemble.last_values(name)
+    last = ensemble.last_values(name) * mesh_ratio({str(key): value for key, value in table.iloc[-1].items()})
     axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
     axes[1].set_title(f"{name} at the end")
     axes[1].set_ylabel("draws")

@@ -59,7 +59,7 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     caption = (
         f"{case.response.capitalize()} over {case.travel_name}: mean and {percent} % band over draws of the posterior, "
-        f"without the noise of a measurement{against}.{_of_cells(table)}"
+        f"without the noise of a measurement{against}.{_of_cells(simulation, table)}"
     )
     titled = f"Case '{case.name}' with {study.settings.draws} draws"
     files = {
@@ -77,7 +77,7 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
         finding=_lead(simulation, table),
         next_step=_next_step(simulation),
         picture=Picture("answer", lambda: force_figure(simulation, table), f"Band of the {case.response}", caption),
-        tables=(Table(headers, rows, titled, note=_of_cells(table).strip()),),
+        tables=(Table(headers, rows, titled, note=_of_cells(simulation, table).strip()),),
         sections=_sections(study, table),
         warnings=tuple(study.warnings),
         files=files | ({"failures.csv": failures} if failures else {}),
@@ -96,14 +96,15 @@ def _completed(simulation: Simulation) -> str:
     return f"{in_full.sum()} of {len(forces)} draws computed in full{failed}, the others to first order"
 
 
-def _of_cells(table: pd.DataFrame) -> str:
+def _of_cells(simulation: Simulation, table: pd.DataFrame) -> str:
     """Return what was done for the size of the cells, as a sentence after others; nothing where nothing was."""
     if not is_mesh_free(table):
         return ""
     last = _last_step(table)
     change = 100 * (last["mesh_free_mean"] / last["mean"] - 1)
     return (
-        f" For cells without size (Richardson, from a mesh of twice the fineness): at the end {change:+.1f} % beside "
+        f" For cells without size (Richardson, from {simulation.finer_mesh}, the error falling with the power "
+        f"{simulation.mesh_order:g} of their size): at the end {change:+.1f} % beside "
         "this mesh, of which a quarter is taken as the sd of its error, within the band."
     )
 
@@ -262,7 +263,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         "forces", lambda: figures()["forces"],
         f"Band of the {case.response}, and what is strained beyond the measurements",
         f"Left: {case.response} over {case.travel_name}: mean and {percent} % band over draws of the posterior, "
-        f"without the noise of a measurement{against}.{_of_cells(table)} Right: how much of the body "
+        f"without the noise of a measurement{against}.{_of_cells(simulation, table)} Right: how much of the body "
         "is strained beyond the measured I1 or I2, and how much of the strain energy is there.",
     )  # fmt: skip
     sections = [Section("What is strained beyond the measurements", (forces,))]
@@ -277,7 +278,8 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         sentences = (
             f"Q is the {case.response} of a draw with its discrepancy, Q0 that of the same draw with its material "
             "parameters alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of "
-            f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
+            f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise"
+            f"{', with **mesh**, the error of the correction for the size of the cells' * is_mesh_free(table)}.",
             *[of_sources(table)] * bool(simulation.ensembles[COMPLETE].sources),
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
@@ -307,11 +309,11 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         sections.append(Section("Draws that were not completed", (failed,)))
     change = simulation.mesh_change
     finer = (
-        f" On a mesh of twice the fineness the {case.response} of one draw at {case.shown(change[1])} changes "
+        f" On {simulation.finer_mesh} the {case.response} of one draw at {case.shown(change[1])} changes "
         f"by {100 * change[0]:+.1f} %."
         if change
         else f" How far the {case.response} is off by the size of the cells is not known: compute it with a finer "
-        "mesh, too."
+        "mesh, too (--finer-mesh)."
     )
     mesh = simulation.case.mesh()
     computed = (

@@ -42,7 +42,10 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 
 UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
-SHARES = {"parameters": BAND, "discrepancy": TRUTH, "extrapolation": SERIES[2], "test_scale": SERIES[3], "noise": BASE}
+SHARES = {
+    "parameters": BAND, "discrepancy": TRUTH, "extrapolation": SERIES[2], "test_scale": SERIES[3], "mesh": SERIES[4],
+    "noise": BASE,
+}  # fmt: skip
 """Colours of what a variance is due to."""
 LABELS = {name: name for name in SHARES} | {"test_scale": "scale of tests"}
 OF_SOURCES = (
@@ -64,12 +67,12 @@ def handy_unit(table: pd.DataFrame, unit: str) -> tuple[str, float]:
     return next((pair for pair in UNITS[unit] if largest * pair[1] >= 1), UNITS[unit][-1])
 
 
-def is_mesh_free(table: pd.DataFrame) -> bool:
+def is_mesh_free(table: Collection[str] | pd.DataFrame) -> bool:
     """Return whether there are bands for cells without size."""
     return "mesh_free_mean" in table
 
 
-def prefix_of(table: pd.DataFrame) -> str:
+def prefix_of(table: Collection[str] | pd.DataFrame) -> str:
     """Return what the columns of the band begin with that is shown: that for cells without size, where there is one."""
     return "mesh_free_" if is_mesh_free(table) else ""
 
@@ -82,7 +85,7 @@ def mesh_ratio(row: Mapping[str, Any]) -> float:
 def shares_in(table: Collection[str] | pd.DataFrame, *, is_shared: bool) -> list[str]:
     """Return the sources of variance that a table, or a row of one, has shares of, where there are several."""
     sources = [name for name in SHARES if name in table and name != "noise"]
-    return sources if is_shared or len(sources) > 2 else []
+    return sources if is_shared or len({*sources} - {"mesh"}) > 2 else []
 
 
 def of_sources(table: pd.DataFrame) -> str:

@@ -51,9 +51,9 @@ def copy_source(run: Path, folder: Path) -> None:
         scratch.rename(stored)
 
 
-def stored_mesh(mesh: str | None) -> dict[str, str]:
-    """Return what the recipe of a simulation says of the mesh that it is of, if there is one."""
-    return {} if mesh is None else {"mesh": f"mesh{Path(mesh).suffix}"}
+def stored_mesh(mesh: str | None, name: str = "mesh") -> str | None:
+    """Return where the folder of a simulation holds the mesh that it is of, if there is one."""
+    return None if mesh is None else f"{name}{Path(mesh).suffix}"
 
 
 def check_mesh(case: Case, folder: Path) -> None:
@@ -65,12 +65,12 @@ def check_mesh(case: Case, folder: Path) -> None:
         When it does.
     """
     if isinstance(case, BodyFromFile):
-        stored = folder / stored_mesh(case.file)["mesh"]
+        stored = folder / f"mesh{Path(case.file).suffix}"
         if stored.is_file() and stored.read_bytes() != case.content():
             raise InputError(f"'{folder}' holds a simulation of another mesh; choose another folder with --out.")
 
 
-def copy_mesh(case: Case, folder: Path) -> None:
+def copy_mesh(case: Case | None, folder: Path, name: str = "mesh") -> None:
     """Copy the mesh that a case is of, if it is of one, into the folder of a simulation."""
     if isinstance(case, BodyFromFile):
-        (folder / stored_mesh(case.file)["mesh"]).write_bytes(case.content())
+        (folder / f"{name}{Path(case.file).suffix}").write_bytes(case.content())

@@ -17,16 +17,17 @@ from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantit
 from tissuq.decks.deck import DeckMaterial
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
 from tissuq.decks.model_files import MODEL, extra_files
-from tissuq.decks.model_run import ModelRun, carried_out, clear_unfinished, sets_of
+from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, sets_of
 from tissuq.decks.quantity import located
 from tissuq.errors import InputError
 from tissuq.export import CALCULIX_PREFIX, Cards, card_format
-from tissuq.finite_elements.simulation import COMPLETE, MATERIAL_ONLY
+from tissuq.finite_elements.simulation import COMPLETE, FINE_MESH, MATERIAL_ONLY
 from tissuq.mechanics import Material
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.studies.earlier_run import load
 from tissuq.studies.ensemble_files import DRAWS
 from tissuq.studies.ensemble_settings import EnsembleSettings
+from tissuq.studies.finer_model import FINER, FinerModel, finer_model
 from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
 
 __all__ = [
@@ -48,6 +49,8 @@ class PreparedEnsemble:
         By material.
     cards : mapping of str to mapping of str to Cards
         By family, and by material.
+    finer : FinerModel or None
+        The same model with a finer mesh.
     """
 
     settings: EnsembleSettings
@@ -56,6 +59,7 @@ class PreparedEnsemble:
     quantities: tuple[Quantity, ...]
     ensembles: Mapping[str, Ensemble]
     cards: Mapping[str, Mapping[str, Cards]]
+    finer: FinerModel | None = None
 
     def blocks(self, family: str, number: int) -> dict[str, str]:
         """Return the blocks of cards of a draw, by material."""
@@ -68,20 +72,25 @@ class PreparedEnsemble:
     def tasks(
         self, folder: Path, *, timeout: float | None = None, retries: int = 0, keep: bool = True, abaqus: str = ""
     ) -> list[ModelRun]:
-        """Return the runs: the complete draws first."""
+        """Return the runs: the complete draws first, that on a finer mesh last."""
         limits = tuple(
             (self.deck.material(name).name.upper(), ensemble.most) for name, ensemble in self.ensembles.items()
         )
         width = len(str(self.settings.draws))
-        return [
-            ModelRun(
-                family, number, folder / MODEL, self.deck.main, self.deck.format.name,
-                tuple(self.blocks(family, number).items()), self.solver, self.quantities, limits,
+
+        def task(family: str, number: int, deck: Deck, place: Path, cards_of: str) -> ModelRun:
+            return ModelRun(
+                family, number, place / MODEL, deck.main, deck.format.name,
+                tuple(self.blocks(cards_of, number).items()), self.solver, self.quantities, limits,
                 folder / DRAWS / f"{family}-{number + 1:0{width}d}", timeout, retries, keep, abaqus,
-            )
-            for family in self.cards
-            for number in range(self.settings.draws)
-        ]  # fmt: skip
+                "" if deck is self.deck else deck.digest,
+            )  # fmt: skip
+
+        draws = range(self.settings.draws)
+        tasks = [task(family, number, self.deck, folder, family) for family in self.cards for number in draws]
+        if self.finer is not None:
+            tasks.append(task(FINE_MESH, self.finer.number, self.finer.deck, folder / FINER, COMPLETE))
+        return tasks
 
     @property
     def card_warnings(self) -> list[str]:
@@ -166,8 +175,10 @@ def prepare_ensemble(
             cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
     _check_names(quantities, ensembles)
     _check_functions(quantities)
-    prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards)
+    check_sets(deck, quantities)
     sets_of(deck, quantities)
+    finer = finer_model(settings, beside, deck, quantities, ensembles.values())
+    prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards, finer)
     for quantity in quantities if not is_dry else ():
         quantity.check()
     return prepared
@@ -217,7 +228,8 @@ def run_ensemble(
 ) -> EnsembleStudy:
     """Run the solver for every draw, those in ``folder`` not again, and gather what they give.
 
-    The first draw is run by itself: where a quantity is not in its results, no other has been run in vain.
+    The first draw is run by itself, and after it one on the finer mesh, where there is such a mesh: where a quantity is
+    not in their results, no other has been run in vain.
 
     Parameters
     ----------
@@ -248,17 +260,20 @@ def run_ensemble(
     tasks = prepared.tasks(folder.absolute(), timeout=timeout, retries=retries, keep=keep, abaqus=abaqus)
     unique = list({task.key: task for task in tasks}.values())
     with progress(len(unique)) as step:
-        if unique[0].key not in read_results(folder / RESULTS):
-            run_tasks(unique[:1], carried_out, folder, pool=pool, others_stay=True)
-        first = read_results(folder / RESULTS)[unique[0].key]
-        if first["misread"] and not first["problem"]:
-            raise InputError(
-                f"{first['misread']} This is kept as the result of draw 1: when the reason is gone, the same command "
-                "with --again makes it again."
-            )
+        for task in unique[:1] if prepared.finer is None else (unique[0], unique[-1]):
+            if task.key not in read_results(folder / RESULTS):
+                run_tasks([task], carried_out, folder, pool=pool, others_stay=True)
+            first = read_results(folder / RESULTS)[task.key]
+            if first["misread"] and not first["problem"]:
+                raise InputError(
+                    f"{first['misread']} This is kept as the result of {task.label}: when the reason is gone, the same "
+                    "command with --again makes it again."
+                )
         results = run_tasks(unique, carried_out, folder, pool=pool, limit=limit, step=step)
     by_key = {task.key: {**result, "folder": task.folder.name} for task, result in zip(unique, results, strict=True)}
-    return EnsembleStudy(prepared, gathered(tasks, [by_key[task.key] for task in tasks], prepared.ensembles.values()))
+    finer = 2.0 if prepared.finer is None else prepared.finer.finer
+    in_order = [by_key[task.key] for task in tasks]
+    return EnsembleStudy(prepared, gathered(tasks, in_order, prepared.ensembles.values(), finer))
 
 
 def _check_names(quantities: tuple[Quantity, ...], ensembles: Mapping[str, Ensemble]) -> None:

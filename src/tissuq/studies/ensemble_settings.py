@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 
 from tissuq.studies.model_settings import ModelSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import pairs_of
-from tissuq.studies.shared_options import sampling, seed
+from tissuq.studies.shared_options import mesh_order, sampling, seed
 
 __all__ = ["EnsembleSettings"]
+
+MESH = "Error of the mesh"
 
 
 class EnsembleSettings(ModelSettings):
@@ -45,3 +48,11 @@ class EnsembleSettings(ModelSettings):
     all_draws: bool = option(False, "Keep draws that are not stable over the measured range.")
     shares: bool = option(True, "Run the draws without their discrepancy, too, for the shares of the variance.")
     seed: int = seed()
+    finer_model: str | None = option(
+        None, "The same model with a finer mesh: one draw is run on it, too, for the error of the mesh.",
+        takes=Path, parse=str, group=MESH,
+    )  # fmt: skip
+    cell_ratio: float | None = option(
+        None, "How many times smaller its elements are [by their number].", gt=1, lt=inf, group=MESH
+    )
+    mesh_order: float | None = mesh_order(MESH)

@@ -12,7 +12,7 @@ from tissuq.studies.option import Settings, argument, option
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
 
-__all__ = ["RunSettings", "sampling", "seed"]
+__all__ = ["RunSettings", "mesh_order", "sampling", "seed"]
 
 
 class RunSettings(Settings):
@@ -43,3 +43,14 @@ def seed() -> Any:
 def sampling() -> Any:
     """Declare how draws spread through a posterior."""
     return option("sobol", "How draws spread: sobol, latin or random.", choices="tissuq.posterior.ensemble:Sampling")
+
+
+def mesh_order(group: str) -> Any:
+    """Declare the order with which what is computed on a finer mesh converges."""
+    return option(
+        None,
+        "Power of the size of elements with which the error of the mesh falls: 1 at sharp edges, 2 without [1].",
+        gt=0,
+        le=8,
+        group=group,
+    )

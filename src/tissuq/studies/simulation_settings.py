@@ -8,11 +8,13 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import model_validator
+
 from tissuq.errors import InputError
 from tissuq.registry import find
 from tissuq.studies.option import option
 from tissuq.studies.option_texts import number_or_text, pairs_of
-from tissuq.studies.shared_options import RunSettings, seed
+from tissuq.studies.shared_options import RunSettings, mesh_order, seed
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
@@ -20,10 +22,11 @@ if TYPE_CHECKING:
 __all__ = ["SimulationSettings"]
 
 
+USUAL_CASE = "indentation"
 BODY = "A body of your own"
 NUMBER = r"(?P<size>[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)"
 MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
-OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts")
+OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts", "finer_mesh", "mesh_order")
 """Options, besides the sets that are held, that say nothing without a mesh."""
 LOADS = {"move": MOVEMENT, "press": MOVEMENT, "inflate": re.compile(f"(?P<set>.+)={NUMBER}", re.IGNORECASE)}
 
@@ -40,9 +43,9 @@ class SimulationSettings(RunSettings):
     ``sizes`` are fields of the case (mm); ``force_noise`` is in N.
     """
 
-    case: str = option(
-        "indentation", "indentation (flat punch, disc), sphere (pressed on a disc), bar (clamped, in tension) or plate "
-        "(with a hole)."
+    case: str | None = option(
+        None, "indentation (flat punch, disc), sphere (pressed on a disc), bar (clamped, in tension) or plate (with a "
+        "hole) [indentation]."
     )  # fmt: skip
     sizes: dict[str, float | str] = option(
         default_factory=dict,
@@ -99,7 +102,22 @@ class SimulationSettings(RunSettings):
         None, "Set whose mean displacement is the answer to a pressure, and its direction: outer=x.", group=BODY
     )
     shape: str | None = option(None, "axisymmetric (around y) or plane (strain), of a mesh in a plane.", group=BODY)
+    finer_mesh: str | None = option(
+        None, "The same body with smaller cells: one draw is computed on it, too, for the error of the mesh.",
+        takes=Path, parse=str, group=BODY,
+    )  # fmt: skip
+    mesh_order: float | None = mesh_order(BODY)
     parts: float = option(1.0, "Such bodies, by symmetry, that bear the force side by side.", gt=0, lt=inf, group=BODY)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _case_unless_mesh(cls, values: Any) -> Any:
+        """Name the usual case where there is no mesh, and none that recipes of earlier versions named beside one."""
+        if not isinstance(values, dict):
+            return values
+        if values.get("mesh") is None:
+            return {**values, "case": values.get("case") or USUAL_CASE}
+        return {**values, "case": None if values.get("case") == USUAL_CASE else values.get("case")}
 
     def sized_case(self, beside: Path = Path()) -> Case:
         """Return the case with its sizes, or the body of a mesh that lies beside a recipe.
@@ -114,6 +132,7 @@ class SimulationSettings(RunSettings):
 
         if self.mesh is not None:
             return self._body(beside / self.mesh)
+        assert self.case is not None  # noqa: S101 (as validated)
         kind = find(Case, "case", self.case, InputError)
         of_body = [name for name in OF_BODY if getattr(self, name) != type(self).model_fields[name].get_default()]
         if self.hold or of_body or issubclass(kind, BodyFromFile):
@@ -131,13 +150,22 @@ class SimulationSettings(RunSettings):
                 raise InputError(f"case '{self.case}': {name} must be {wanted} like {sizes[name]}, not '{value}'.")
         return kind(**self.sizes)
 
+    def finer_case(self, beside: Path = Path()) -> Case | None:
+        """Return the body of the finer mesh; None where there is none.
+
+        Raises
+        ------
+        InputError
+            As `sized_case`.
+        """
+        return None if self.finer_mesh is None else self._body(beside / self.finer_mesh)
+
     def _body(self, file: Path) -> Case:
         from tissuq.finite_elements.inflated import InflatedBody
         from tissuq.finite_elements.mesh_file import BodyFromFile
 
         given = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
-        is_of_case = self.sizes or self.case != type(self).model_fields["case"].default
-        if len(given) != 1 or is_of_case or bool(self.watch) != bool(self.inflate):
+        if len(given) != 1 or self.sizes or self.case or bool(self.watch) != bool(self.inflate):
             raise InputError(
                 "a body from a mesh has no --case or --size, and needs one of --move ymax=y:-0.4, --press ymax=y:-0.4, "
                 "and --inflate inner=2 --watch outer=x."

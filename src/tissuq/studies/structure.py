@@ -141,6 +141,8 @@ def run_simulation(
         full_runs=settings.full_runs,
         force_noise=settings.force_noise,
         bulk_ratio=settings.bulk_ratio,
+        finer=settings.finer_case(beside),
+        mesh_order=settings.mesh_order,
         run=carried_out,
     )
     return SimulationStudy(settings, posteriors, simulation)

@@ -16,7 +16,8 @@ const FIELDS = [
     ["turn", "Change the sign of", ["load", "deformation", "both"]]]],
   ["The specimen, undeformed", [
     ["dimensions.length", "Length", "20 mm"], ["dimensions.area", "Cross-section", "10 mm2"], ["dimensions.width", "Width", "5 mm"],
-    ["dimensions.thickness", "Thickness", "2 mm"], ["dimensions.diameter", "Diameter", "8 mm"]]],
+    ["dimensions.thickness", "Thickness", "2 mm"], ["dimensions.diameter", "Diameter", "8 mm"],
+    ["incompressible", "Take its volume as constant", Boolean]]],
   ["Where it begins", [
     ["zero", "Displacement counts from", "first, or 35.2 mm"], ["load_zero", "Load counts from", "first, or 0.02 N"],
     ["preload", "Taut (stretch 1) from", "auto, or 0.05 N"], ["compliance", "Compliance of the machine", "0.5 um/N"]]],

@@ -215,6 +215,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         Lowest and highest stretch, or amount of shear, of the rows to use, as counted from the preload.
     until_peak : bool
         Leave out the rows after the largest stress of those that are left: rupture, relaxation, unloading.
+    incompressible : bool
+        Take the volume of a uniaxial test as constant, though a column of lateral strains says that it changes.
     every : int
         Use only every second (2), third (3) ... of these rows.
     axis : str, optional
@@ -347,7 +349,7 @@ def read_rows(
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
     check_signs(used, choices, bool(is_positive), options.get("turn"))
-    if mode.name == Uniaxial.name and (volume := volume_step(used)):
+    if mode.name == Uniaxial.name and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
         used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)

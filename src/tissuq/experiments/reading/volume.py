@@ -23,13 +23,14 @@ STANDARD_ERRORS, INDEPENDENT_ROWS = 2.0, 10
 """How clearly the ratio is less, taking the rows of a smooth curve for so many measurements."""
 
 
-def volume_step(measured: MeasuredRows) -> str:
+def volume_step(measured: MeasuredRows, *, is_taken: bool = False) -> str:
     """Return Poisson's ratio of a uniaxial test with lateral strains, as a step; an empty text without them.
 
     Raises
     ------
     InputError
-        When they are clearly those of a material whose volume changes, which no law here describes.
+        When they are clearly those of a material whose volume changes, which no law here describes, unless that
+        ``is_taken`` as it is.
     """
     table = measured.table
     along = np.log(measured.stretch[0])
@@ -38,15 +39,18 @@ def volume_step(measured: MeasuredRows) -> str:
     if np.abs(along).max() < LEAST_STRAIN or lateral.min() <= 0:
         return ""
     ratio, error = poisson_ratio(along, np.log(lateral))
+    said = f"Poisson's ratio {ratio:.2f} ± {error:.2f}"
     if ratio + STANDARD_ERRORS * error >= LEAST_RATIO:
-        return f"Poisson's ratio {ratio:.2f} ± {error:.2f} by column {table.label(number)}"
+        return f"{said} by column {table.label(number)}"
+    if is_taken:
+        return f"taken as incompressible, though {said} by column {table.label(number)}"
     end = int(np.argmax(np.abs(along)))
     change = np.exp(along[end] * (1 - 2 * ratio)) - 1
     raise InputError(
-        f"{table.place(number)}: the specimen does not keep its volume (Poisson's ratio {ratio:.2f} ± {error:.2f}; at "
-        f"stretch {np.exp(along[end]):.3g} it changes by {change:+.0%}), while every material here is incompressible: "
-        "its modulus would be wrong. Foams and lung need a compressible law in another tool. To fit it as "
-        "incompressible all the same, leave that column out."
+        f"{table.place(number)}: the specimen does not keep its volume ({said}; at stretch "
+        f"{np.exp(along[end]):.3g} it changes by {change:+.0%}), while every material here is incompressible: "
+        "its modulus would be wrong. Foams and lung need a compressible law in another tool. To fit it as one of "
+        "constant volume all the same, give --incompressible."
     )
 
 
