@@ -8,10 +8,10 @@ import pytest
 import tissuq as tq
 from forward_models import DEPTH, neo_hooke
 from tissuq.emulation import FileForward, gathered
-from tissuq.emulation.forward import CallableForward, as_forward
+from tissuq.emulation.forward import CallableForward, SeveralModels, as_forward
 from tissuq.emulation.problem import pose
 from tissuq.emulation.runs import ForwardRun, carry_out
-from tissuq.errors import InputError
+from tissuq.errors import ConvergenceError, InputError
 from tissuq.studies.calibrate import runs_of
 
 PRIORS = {"C10": tq.Uniform(0.2, 5.0)}
@@ -192,3 +192,27 @@ def test_failed_runs_are_told_in_the_result():
     near = neo_hooke({"C10": 3.49}) + 0.05 * np.random.default_rng(0).standard_normal(len(DEPTH))
     found = tq.calibrate(DEPTH, near, fragile, PRIORS, noise_sd=0.5, runs=16)
     assert "the emulator is unreliable" in " ".join(found.warnings)
+
+
+def locks(parameters, control):
+    raise ConvergenceError("the solver gave up")
+
+
+def test_of_several_models_the_one_that_fails_is_named_and_each_gets_its_controls():
+    controls = {"force": np.array([1.0, 2.0]), "pull": np.array([3.0]), "neck": np.array([4.0, 5.0])}
+    double = {"pull": lambda of: of["pull"] * 2, "neck": lambda of: of["neck"] * 3}
+    models = as_forward(
+        {
+            "force": lambda parameters, control: parameters["a"] * control,
+            ("pull", "neck"): lambda parameters, control: {name: of(control) for name, of in double.items()},
+        }
+    )
+    outputs = models.run({"a": 10.0}, controls)
+    assert {name: list(values) for name, values in outputs.items()} == {
+        "force": [10.0, 20.0],
+        "pull": [6.0],
+        "neck": [12.0, 15.0],
+    }
+    failing = SeveralModels(((("force",), as_forward(locks)),))
+    with pytest.raises(ConvergenceError, match=r"test_runs\.locks: the solver gave up"):
+        failing.run({"a": 1.0}, controls)
