@@ -136,9 +136,17 @@ def test_a_run_that_fails_on_the_finer_mesh_is_told_and_leaves_the_band(cli, her
     assert not (here / "out" / "failures.csv").exists()
 
 
+def numbers_of(line):
+    return [float(word) for word in line.split(",") if word.strip()]
+
+
 def test_the_finer_example_is_the_other_with_every_element_divided_into_four():
     coarse, fine = ((EXAMPLES / f"indentation{end}.inp").read_text(encoding="utf-8") for end in ("", "-fine"))
-    assert refined(coarse, 2).splitlines()[3:] == fine.splitlines()[3:]
+    divided, stored = refined(coarse, 2).splitlines()[3:], fine.splitlines()[3:]
+    assert len(divided) == len(stored)
+    for first, second in zip(divided, stored, strict=True):
+        # Coordinates of seven digits: Python 3.12 and later may round the last one otherwise.
+        assert first == second or numbers_of(first) == pytest.approx(numbers_of(second), abs=2e-6)
 
 
 @pytest.mark.finite_elements
