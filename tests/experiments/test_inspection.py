@@ -88,6 +88,15 @@ def test_a_reference_between_measurements_is_no_late_beginning(inspected):
     assert "not near" not in notes(inspected(stretch, 1e3 * neo_hookean(stretch)))
 
 
+@pytest.mark.parametrize("first", [0.9855, 1.0145])
+@pytest.mark.parametrize("offset", [0.0, 8.0, -8.0])
+def test_a_stress_next_to_the_reference_is_a_preload_only_where_the_curve_misses_zero(inspected, first, offset):
+    stretch = np.linspace(first, 1.3, 15)
+    stress = 1e3 * neo_hookean(stretch)
+    assert abs(stress[0]) > 0.05 * stress.max()
+    assert ("the stress is already" in notes(inspected(stretch, stress + offset))) is (offset != 0)
+
+
 def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
     stretch, _ = cycles([1.3, 1.3], rows=50)
     unloads = np.diff(stretch, append=1.0) < 0

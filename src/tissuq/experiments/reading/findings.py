@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from itertools import chain
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
@@ -24,6 +25,8 @@ MIN_ROWS_PER_CYCLE = 10
 """Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
 NOTABLE_SHARE = 0.05
 """Share of the largest stress, or of the range of stretches, that is worth a word."""
+ROWS_OF_LINE = 3
+"""Measurements next to the reference, at the least, through which a line says the stress there."""
 NEGLIGIBLE_STRESS = 0.01
 """Share of the largest stress that is none."""
 PLAUSIBLE_STRESS = (1e-6, 1e3)
@@ -111,7 +114,11 @@ def _reference(reading: Reading, number: int) -> str:
             return ""  # between measurements, which says neither where the test begins nor what its zero is
         return f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
     at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
-    if abs(at_reference) <= NOTABLE_SHARE * largest:
+    stresses = [at_reference]
+    if points.ndim == 1 and gap > 0:  # what a line through the measurements next to the reference has there
+        rows = change <= max(ROWS_OF_LINE * gap, np.sort(change)[min(ROWS_OF_LINE, len(change)) - 1])
+        stresses.append(float(Polynomial.fit(points[rows] - mode.reference, stress[rows], 1)(0.0)))
+    if min(np.sign(at_reference) * np.array(stresses)) <= NOTABLE_SHARE * largest:
         return ""
     return (
         f"at {control.name} {stretch[nearest]:.4g} {STRESS_AT_REST} {at_reference / unit.to_mpa:.3g} {unit.name}, "
