@@ -140,6 +140,43 @@ def test_experiments_have_a_file_and_a_model_each(cli, here, words):
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 
+def test_files_that_several_models_need_are_copied_for_each_and_the_run_is_repeated(cli, here, words):
+    """Of two decks one includes a mesh beside its folder; both get a file that none includes."""
+    mean, sd = two_experiments(here)
+    deck = (here / "model.inp").read_text()
+    nodes = "*NODE, NSET=TOP\n1, 0., 0., 0.\n"
+    (here / "mesh.inp").write_text(nodes)
+    (here / "punch").mkdir()
+    (here / "punch" / "model.inp").write_text(deck.replace(nodes, "*INCLUDE, INPUT=../mesh.inp\n"))
+    (here / "fibres.txt").write_text("none")
+    changed = {"model.inp": "punch/model.inp", NOISE_SD: f"force={NOISE_SD},pull={5e-5}"}
+    words = [words[0], "punch.csv", "pull.csv", *(changed.get(word, word) for word in words[2:])]
+    said = cli(*words, *WIDE, *TWO, "--also", "mesh.inp", "--also", "fibres.txt")
+    assert said.status == 0, said.err
+    assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
+    repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--no-figures", "--out", "again"]
+    said = cli(*repeat, "--command", words[words.index("--command") + 1])
+    assert said.status == 0, said.err
+    assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
+    for number in (1, 2):
+        copies = {path.name for path in (here / "again" / "input" / f"{number}").rglob("*")}
+        assert {"mesh.inp", "fibres.txt"} <= copies
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
+def test_what_is_killed_in_a_second_model_keeps_the_run_of_the_first(cli, here, words):
+    """Only the run of the solver that was going on is made again: 17 of two models at 8 points."""
+    two_experiments(here)
+    words = [words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, *TWO, "--noise-sd", f"force={NOISE_SD},pull={5e-5}"]
+    (here / "slow").write_text("1")
+    killed_after(6, here / "started", here, *words)
+    (here / "slow").unlink()
+    said = cli(*words)
+    assert said.status == 0, said.err
+    assert len(started(here)) == 2 * 8 + 1
+    assert not list((here / "out-forward-runs").glob("model-*/solver/*"))
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
@@ -147,6 +184,7 @@ def test_experiments_have_a_file_and_a_model_each(cli, here, words):
         (["--model", "pull.inp"], "give --qoi for each of 2"),
         (["--model", "pull.inp", "--qoi", "drop=RF2@TOP"], "no file has a column 'drop' (--qoi drop=...)"),
         (["--model", "pull.inp", "--qoi", "time=RF2@TOP"], "punch.csv and pull.csv have a column 'time'"),
+        (["--model", "pull.inp", "--qoi", "time=RF2@TOP"], "exactly one file must have it; rename it in the others."),
         ([*TWO, "--along", "depth=U2@TOP"], "no file has a column 'depth' (--along depth=...)"),
         ([*TWO, "--replace", "THIRD"], "give --replace once for all models, or for each of the 2"),
         ([*TWO, "--along", "time=U2@TOP"], "punch.csv and pull.csv have a column 'time'"),

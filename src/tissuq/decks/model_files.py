@@ -65,6 +65,8 @@ def deck_folder(deck: Deck) -> str:
 def extra_files(deck: Deck, also: Sequence[str], beside: Path) -> dict[str, Path]:
     """Return the files that go with the deck and that it does not include, by their places in its root.
 
+    Of the same file in several folders one is taken: decks that are run together may have a copy each.
+
     Raises
     ------
     InputError
@@ -77,11 +79,12 @@ def extra_files(deck: Deck, also: Sequence[str], beside: Path) -> dict[str, Path
             raise InputError(f"there is no file '{file}' to go with the model (--also).")
         if included_place(deck, file) is not None:
             continue
-        if place in deck.files:
+        if place in deck.files and deck.files[place] != file.read_bytes():
             raise InputError(f"'{file}' would take the place of a file of the model (--also).")
-        if place in extra:
+        if place in extra and not filecmp.cmp(extra[place], file, False):
             raise InputError(f"two files called '{file.name}' are to go with the model (--also): rename one.")
-        extra[place] = file
+        if place not in deck.files:
+            extra[place] = file
     return extra
 
 

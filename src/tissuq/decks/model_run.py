@@ -24,7 +24,7 @@ from tissuq.decks.result_file import ALL, unknown_set
 from tissuq.decks.solver import LOG, Solver
 from tissuq.errors import InputError
 
-__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "check_sets", "clear_unfinished", "sets_of"]
+__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "check_sets", "clear_unfinished", "problem_of", "sets_of"]
 
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
@@ -133,6 +133,14 @@ def clear_unfinished(folder: Path) -> None:
     """Delete what runs of a process that was killed have left in the folder of all runs."""
     for unfinished in folder.glob(f"{SCRATCH}*"):
         shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def problem_of(folder: Path) -> str:
+    """Return why the run of the solver in a folder did not end well; empty where it did, or there is none."""
+    try:
+        return str(json.loads((folder / DONE).read_text(encoding="utf-8"))["problem"])
+    except OSError:
+        return ""
 
 
 def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:

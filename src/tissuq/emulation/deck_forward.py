@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tissuq.decks import Deck, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_files import MODEL, copy_model, extra_files
-from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, sets_of
+from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, problem_of, sets_of
 from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material
@@ -189,22 +189,29 @@ class DeckForward(Forward):
 
     def run(self, parameters: Mapping[str, float], control: FloatArray | Mapping[str, FloatArray]) -> Any:
         assert self.folder is not None  # noqa: S101 (where it is run, it is prepared)
-        deck = self.read_deck
-        block = self._block(parameters)
-        place = sha256(repr((block, sorted(parameters.items()))).encode()).hexdigest()[:PLACES]
+        deck, block = self.read_deck, self._block(parameters)
         task = ModelRun(
             "run", 0, self.folder / MODEL, deck.main, deck.format.name, ((self.replaced, block),), self.program,
-            self.quantities, (), self.folder / SOLVED / f"run-{place}", self.timeout, self.retries,
+            self.quantities, (), self._place(parameters), self.timeout, self.retries,
             abaqus=self.abaqus,
         )  # fmt: skip
         result = carried_out(task)
         if result["misread"] and not result["problem"]:
             raise UnreadableError(result["misread"])
-        if not (self.keep or result["problem"]):
-            shutil.rmtree(task.folder, ignore_errors=True)
         if not isinstance(control, Mapping):
             return self._at(control, "", result["curves"], str(result["problem"]))
         return {name: self._at(at, name, result["curves"], str(result["problem"])) for name, at in control.items()}
+
+    def clear(self, parameters: Mapping[str, float]) -> None:
+        place = self._place(parameters)
+        if not (self.keep or problem_of(place)):
+            shutil.rmtree(place, ignore_errors=True)
+
+    def _place(self, parameters: Mapping[str, float]) -> Path:
+        """Return the folder of a run."""
+        assert self.folder is not None  # noqa: S101 (where it is run, it is prepared)
+        digest = sha256(repr(sorted(parameters.items())).encode()).hexdigest()
+        return self.folder / SOLVED / f"run-{digest[:PLACES]}"
 
     def _block(self, parameters: Mapping[str, float]) -> str:
         """Return the card of the material with parameters in the unit of the model."""

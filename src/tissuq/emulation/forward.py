@@ -73,6 +73,9 @@ class Forward(ABC):
         """Return the model as it runs with files in a folder, which exists and keeps its runs."""
         return self
 
+    def clear(self, parameters: Mapping[str, float]) -> None:  # noqa: B027  (most kinds leave no files)
+        """Delete the files of a run that has succeeded; until then what is stopped can go on from them."""
+
 
 @dataclass(frozen=True)
 class CallableForward(Forward):
@@ -154,6 +157,9 @@ class SeveralQuantities(Forward):
     def prepared_in(self, folder: Path) -> Forward:
         return replace(self, model=self.model.prepared_in(folder))
 
+    def clear(self, parameters: Mapping[str, float]) -> None:
+        self.model.clear(parameters)
+
 
 @dataclass(frozen=True)
 class SeveralModels(Forward):
@@ -206,6 +212,10 @@ class SeveralModels(Forward):
             (own_folder := folder / f"model-{number}").mkdir(exist_ok=True)
             prepared.append((names, model.prepared_in(own_folder)))
         return SeveralModels(tuple(prepared))
+
+    def clear(self, parameters: Mapping[str, float]) -> None:
+        for _, model in self.models:
+            model.clear(parameters)
 
 
 def as_forward(forward: Forward | Callable[..., Any] | Mapping[Any, Any]) -> Forward:

@@ -141,6 +141,8 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
         result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
     else:
         result |= _checked(outputs, run)
+        if not result["error"]:
+            run.forward.clear(dict(run.parameters))
     return result | {"parameters": dict(run.parameters), "seconds": perf_counter() - start}
 
 

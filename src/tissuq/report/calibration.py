@@ -159,8 +159,8 @@ def _model_copies(
         copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
         models.append(f"{stored}/{deck.main}")
         also = [stored_place(deck, Path(file)) for file in forward.also]
-        places = [file if Path(file).is_absolute() else f"{place}/{file}" for file in also]
-    relocated: dict[str, Any] = {"models": tuple(models), "also": places}
+        places += [file if Path(file).is_absolute() else f"{place}/{file}" for file in also]
+    relocated: dict[str, Any] = {"models": tuple(models), "also": list(dict.fromkeys(places))}
     for setting in ("quantities", "along"):
         texts = dict(getattr(settings, setting))
         for name, text in texts.items():

@@ -183,7 +183,10 @@ def _names_of_files(settings: CalibrationSettings, tables: Sequence[Table]) -> l
             having = [str(table.file) for table in tables if _has(table, name)]
             if len(having) != 1:
                 files = f"{' and '.join(having)} have" if having else "no file has"
-                raise InputError(f"{files} a column '{name}' ({option} {name}=...): exactly one file must have it.")
+                advice = "; rename it in the others" if having else ""
+                raise InputError(
+                    f"{files} a column '{name}' ({option} {name}=...): exactly one file must have it{advice}."
+                )
     names_of_files = [[name for name in settings.measured_names if _has(table, name)] for table in tables]
     for table, of_file in zip(tables, names_of_files, strict=True):
         if not of_file:
