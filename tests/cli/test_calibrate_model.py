@@ -200,6 +200,16 @@ def test_files_and_models_that_do_not_fit_end_with_one_message(cli, here, words,
     assert started(here) == []
 
 
+def test_two_controls_of_one_of_several_files_are_refused(cli, here, words):
+    two_experiments(here)
+    (here / "pull.csv").write_text("travel,turn,pull (N)\n0.2,1,0.001\n0.5,2,0.002\n0.9,3,0.003\n")
+    along = ["--along", "travel=U2@TOP", "--along", "turn=U1@TOP"]
+    said = cli(words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, "--noise-sd", "unknown", *TWO, *along)
+    assert said.status == 2
+    assert "has the columns travel and turn, both given as its control (--along)" in " ".join(said.err.split())
+    assert started(here) == []
+
+
 def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
     mean, sd = forces(here)
     (here / "stiff").write_text("6.83")  # above which are 4 of 12 stratified runs: as many are left as in other tests

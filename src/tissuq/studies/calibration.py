@@ -157,27 +157,27 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
 def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measured], list[OfModel]]:
     """Return what was measured, by quantity, and what of it each file has; rows count where there is a value."""
     tables = [read_table(folder / file, settings.skip_rows, settings.sheet) for file in settings.files]
+    experiments = _experiments(settings, tables)
     if settings.measured_names == ("",):
         columns = _places(tables[0], (settings.control, settings.measured))
-        return {"": _measured(tables[0], columns, settings.every)}, [OfModel(("",), next(iter(settings.along), ""))]
+        return {"": _measured(tables[0], columns, settings.every)}, experiments
     data: dict[str, Measured] = {}
-    experiments = []
-    for table, names in zip(tables, _names_of_files(settings, tables), strict=True):
+    for table, (names, controlled) in zip(tables, experiments, strict=True):
         places = {name: _place(table, name) for name in names}
-        controls = [name for name in settings.along if _has(table, name)] if len(tables) > 1 else [*settings.along]
-        control = _control(table, [*places.values()], settings.control, controls if len(tables) > 1 else [])
+        named = controlled if len(tables) > 1 else ""
+        requested = settings.control if settings.control is not None else named or None
+        control = _control(table, [*places.values()], requested)
         data |= {
             name: _measured(table.without_missing([place]), (control, place), settings.every)
             for name, place in places.items()
         }
-        experiments.append(OfModel(tuple(names), controls[0] if controls else ""))
     return data, experiments
 
 
-def _names_of_files(settings: CalibrationSettings, tables: Sequence[Table]) -> list[list[str]]:
-    """Return the names of the quantities of each file, which are those of its columns."""
+def _experiments(settings: CalibrationSettings, tables: Sequence[Table]) -> list[OfModel]:
+    """Return what each file is of: of several, the quantities and the control that are called as its columns."""
     if len(tables) == 1:
-        return [list(settings.measured_names)]
+        return [OfModel(settings.measured_names, next(iter(settings.along), ""))]
     for option, names in (("--qoi", settings.measured_names), ("--along", settings.along)):
         for name in names:
             having = [str(table.file) for table in tables if _has(table, name)]
@@ -187,18 +187,24 @@ def _names_of_files(settings: CalibrationSettings, tables: Sequence[Table]) -> l
                 raise InputError(
                     f"{files} a column '{name}' ({option} {name}=...): exactly one file must have it{advice}."
                 )
-    names_of_files = [[name for name in settings.measured_names if _has(table, name)] for table in tables]
-    for table, of_file in zip(tables, names_of_files, strict=True):
-        if not of_file:
+    experiments = []
+    for table in tables:
+        measured, controls = (
+            [name for name in names if _has(table, name)] for names in (settings.measured_names, settings.along)
+        )
+        if not measured:
             raise InputError(f"{table.file} has no column that is called as a quantity (--qoi NAME=...).")
-    return names_of_files
+        if len(controls) > 1:
+            raise InputError(
+                f"{table.file} has the columns {' and '.join(controls)}, both given as its control (--along): give one."
+            )
+        experiments.append(OfModel(tuple(measured), controls[0] if controls else ""))
+    return experiments
 
 
-def _control(table: Table, measured: Sequence[int], requested: str | int | None, named: Sequence[str]) -> int:
-    """Return the column of the control: the one that is requested, that --along names, or that is left."""
+def _control(table: Table, measured: Sequence[int], requested: str | int | None) -> int:
+    """Return the column of the control: the one that is requested, or that is left."""
     columns = [index for index in range(len(table.names)) if index not in measured]
-    if requested is None and len(named) == 1:
-        requested = named[0]
     if requested is None and len(columns) != 1:
         names = ", ".join(table.label(index) for index in columns)
         raise InputError(f"{table.file} has the columns {names}: name that of the control (--control NAME).")

@@ -146,9 +146,7 @@ class CalibrationSettings(ModelSettings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        for sd in value.values() if isinstance(value, dict) else [value]:
-            positive_or_unknown(sd, "the unit of the measured values")
-        return value
+        return positive_or_unknown(value, "the unit of the measured values")
 
     @model_validator(mode="before")
     @classmethod
@@ -244,7 +242,7 @@ class CalibrationSettings(ModelSettings):
         self,
         beside: Path = Path(),
         units: Mapping[str, tuple[str, str]] = MappingProxyType({}),
-        experiments: Sequence[OfModel] | None = None,
+        experiments: Sequence[OfModel] = (),
         **running: Any,
     ) -> Forward:
         """Return what is run.
@@ -256,8 +254,8 @@ class CalibrationSettings(ModelSettings):
         units : mapping of str to (str, str)
             Of control and measured values in the file, by the names of `measured_names`; empty where it does not say,
             which is refused for quantities that have a unit in a finite-element model.
-        experiments : sequence of OfModel, optional
-            What each of several finite-element models gives; a single one gives everything.
+        experiments : sequence of OfModel
+            What each finite-element model gives.
         **running
             How a finite-element model is run: fields of `tissuq.DeckForward`.
         """
@@ -267,7 +265,6 @@ class CalibrationSettings(ModelSettings):
             return UmbridgeForward(self.umbridge, self.server_model)
         if not self.models:
             return FileForward(str(self.forward))
-        experiments = experiments or [OfModel(self.measured_names, next(iter(self.along), ""))]
         replaced = self.replaced * (len(self.models) if len(self.replaced) == 1 else 1)
         decks = [
             self._deck_forward(beside / model, of_model, material, units, beside, running)

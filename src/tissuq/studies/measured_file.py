@@ -173,9 +173,9 @@ class FittedSettings(Settings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        for sd in value.values() if isinstance(value, dict) else [value]:
-            positive_or_unknown(sd, "the file's stress unit", "; noise of zero would make every measurement exact")
-        return value
+        return positive_or_unknown(
+            value, "the file's stress unit", "; noise of zero would make every measurement exact"
+        )
 
     @model_validator(mode="after")
     def _one_noise(self) -> Self:

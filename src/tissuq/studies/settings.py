@@ -146,8 +146,10 @@ def _place(item: Any) -> str:
 def positive_or_unknown(value: Any, unit: str, reason: str = "") -> Any:
     """Return a standard deviation, or 'unknown'; a ValueError, which pydantic reports with the setting, of any else.
 
-    ``unit`` says in which it is, and ``reason`` why nothing else is possible.
+    Or these by name. ``unit`` says in which they are, and ``reason`` why nothing else is possible.
     """
+    if isinstance(value, dict):
+        return {name: positive_or_unknown(sd, unit, reason) for name, sd in value.items()}
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if value != "unknown" and not (is_number and 0 < value < inf):
         raise ValueError(f"must be a positive number in {unit}, or 'unknown', not {value!r}{reason}")
