@@ -8,9 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from tissuq.errors import InputError
+from tissuq.finite_elements.body_from_file import BodyFromFile
 from tissuq.finite_elements.case import FloatArray, Inflation, Mesh, Supports
 from tissuq.finite_elements.library import region_of
-from tissuq.finite_elements.mesh_file import AXES, BodyFromFile
+from tissuq.finite_elements.mesh_file import AXES
 
 __all__ = ["InflatedBody"]
 

@@ -7,8 +7,8 @@ import shutil
 from pathlib import Path
 
 from tissuq.errors import InputError
+from tissuq.finite_elements.body_from_file import BodyFromFile
 from tissuq.finite_elements.case import Case
-from tissuq.finite_elements.mesh_file import BodyFromFile
 from tissuq.report.run_folder import INPUT, RECIPE
 from tissuq.studies.earlier_run import POSTERIORS
 

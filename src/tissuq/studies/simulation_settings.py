@@ -127,8 +127,8 @@ class SimulationSettings(RunSettings):
         InputError
             When there is no such case or size, a size is not possible, or the mesh cannot be used.
         """
+        from tissuq.finite_elements.body_from_file import BodyFromFile
         from tissuq.finite_elements.case import Case
-        from tissuq.finite_elements.mesh_file import BodyFromFile
 
         if self.mesh is not None:
             return self._body(beside / self.mesh)
@@ -161,8 +161,8 @@ class SimulationSettings(RunSettings):
         return None if self.finer_mesh is None else self._body(beside / self.finer_mesh)
 
     def _body(self, file: Path) -> Case:
+        from tissuq.finite_elements.body_from_file import BodyFromFile
         from tissuq.finite_elements.inflated import InflatedBody
-        from tissuq.finite_elements.mesh_file import BodyFromFile
 
         given = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
         if len(given) != 1 or self.sizes or self.case or bool(self.watch) != bool(self.inflate):
