@@ -89,12 +89,9 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write a figure as SVG and PNG, the same bytes for the same figure."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    # Canvases draw once, where `Figure.savefig` draws twice; Matplotlib gives these functions no types.
-    write_svg: Callable[..., None] = FigureCanvasSVG(figure).print_svg
     with rc_context(STYLE):
-        write_svg(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+        _write_svg(figure, folder / f"{name}.svg")
         figure.set_layout_engine("none")  # the layout of the first file is that of the second
         figure.dpi = 150
         write_png: Callable[..., None] = FigureCanvasAgg(figure).print_png
@@ -104,11 +101,17 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
 def inline_svg(figure: Figure, words: str) -> str:
     """Return a figure as SVG for a page of HTML, with words for those who cannot see it; its letters are text."""
     from matplotlib import rc_context
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     written = StringIO()
     with rc_context(STYLE | {"svg.fonttype": "none"}):
-        write: Callable[..., None] = FigureCanvasSVG(figure).print_svg
-        write(written, metadata={"Date": None, "Creator": None})
+        _write_svg(figure, written)
     text = written.getvalue()
     return text[text.index("<svg") :].replace("<svg ", f'<svg role="img" aria-label="{words}" ', 1)
+
+
+def _write_svg(figure: Figure, target: Path | StringIO) -> None:
+    """Write a figure by its canvas, which draws once, where `Figure.savefig` draws twice."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    write: Callable[..., None] = FigureCanvasSVG(figure).print_svg  # to which Matplotlib gives no types
+    write(target, metadata={"Date": None, "Creator": None})

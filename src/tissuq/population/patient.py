@@ -84,10 +84,11 @@ def patient_posterior(
     for i, posterior in enumerate(posteriors):
         rows = np.arange(i, chains * draws, count)
         matching = matching_draws(posterior, coordinates, on_line[rows, i])
-        unknown = [symbol for symbol in model.symbols if symbol in posterior.model.symbols]  # all, but a known noise
-        values[rows] = posterior.model.noise_of_tests[1]
-        columns_of_specimen = [model.symbols.index(symbol) for symbol in unknown]
-        values[rows[:, None], columns_of_specimen], _ = values_of(posterior.model, matching, unknown)
+        is_unknown = np.isin(model.symbols, posterior.model.symbols)
+        unknown = [symbol for symbol in model.symbols if symbol in posterior.model.symbols]
+        values[rows[:, None], np.flatnonzero(is_unknown)], _ = values_of(posterior.model, matching, unknown)
+        if len(unknown) < len(model.symbols):  # the noise of this specimen is known
+            values[rows[:, None], np.flatnonzero(~is_unknown)] = posterior.model.noise_of_tests[1]
     values[:, [model.symbols.index(symbol) for symbol in coordinates.symbols]] = new.reshape(-1, size)
     columns = dict(zip(model.symbols, values.T, strict=True))
     settings, linear = (

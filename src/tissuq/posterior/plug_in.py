@@ -119,7 +119,7 @@ class ErrorEstimates:
         Only beside an energy discrepancy: without one, what looks like correlated errors is that of the material.
         Compared are few energies, each noise at the level that suits it best. A longer correlation than a share of the
         curve is not tried: such errors are the smooth ones of the test. The log evidence is concave, nearly, in the
-        coordinate in which the lags are evenly spaced: it ends where the gain can no longer be reached.
+        coordinate in which the lags are evenly spaced: the search ends where the gain can no longer be reached.
         """
         fewest = min(map(len, model.experiment.curves))
         is_open = type(model.noise) is UnknownNoise and bool(model.energy_symbols) and self._sums_noise(model)

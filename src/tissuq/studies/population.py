@@ -83,7 +83,9 @@ def run_population(
     known = settings.covariate_table(tests, folder)
     covariates = covariates_of(known.values() if known else None, list(tests), known.place if known else None)
     covariates.row(settings.new_patient)  # raises where there is no such patient, before specimens are fitted
-    noise_sd = settings.noise_sd if isinstance(settings.noise_sd, dict) else {}
+    unit, noise_sd = _unit(tests), None
+    if isinstance(settings.noise_sd, dict):
+        noise_sd = {name: sd if sd == "unknown" else sd * unit.to_mpa for name, sd in settings.noise_sd.items()}
     step(f"{len(tests)} specimens")
     start = perf_counter()
     population = fit_population(
@@ -94,10 +96,9 @@ def run_population(
         shared_discrepancy=settings.shared_discrepancy,
         material=law or material_named(settings.material),
         discrepancy=settings.discrepancy,
-        noise=None if noise_sd else settings.noise_in(_unit(tests)),
-        noise_sd={name: f"{sd} {_unit(tests).name}" if sd != "unknown" else sd for name, sd in noise_sd.items()}
-        or None,
-        tolerances=settings.tolerances_in(_unit(tests)),
+        noise=settings.noise_in(unit) if noise_sd is None else None,
+        noise_sd=noise_sd,
+        tolerances=settings.tolerances_in(unit),
         method=cast("Method", settings.method),
         seed=settings.seed,
     ).given(settings.new_patient)

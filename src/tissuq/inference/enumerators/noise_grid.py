@@ -154,17 +154,13 @@ def _refined(
     while len(values) < MAX_VALUES:
         log_noises = np.array(sorted(values))
         logs = np.array([values[log_noise] for log_noise in log_noises])
-        smallest_that_matters = logs.max() - NEGLIGIBLE_DROP
-        matters = np.maximum(logs[1:], logs[:-1]) > smallest_that_matters
+        floor = logs.max() - NEGLIGIBLE_DROP
+        matters = np.maximum(logs[1:], logs[:-1]) > floor
         is_rough = matters & (np.abs(np.diff(logs)) > MAX_DROP) & (np.diff(log_noises) > MIN_STEP)
         new = list(0.5 * (log_noises[1:] + log_noises[:-1])[is_rough])
         # Below the resolution of the tests, nothing but the prior depends on the noise: it is the end's.
-        new += (
-            [log_noises[0] - MAX_STEP]
-            if logs[0] > smallest_that_matters and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP
-            else []
-        )
-        new += [log_noises[-1] + MAX_STEP] if logs[-1] > smallest_that_matters else []
+        new += [log_noises[0] - MAX_STEP] if logs[0] > floor and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP else []
+        new += [log_noises[-1] + MAX_STEP] if logs[-1] > floor else []
         new = [float(np.clip(log_noise, *ends)) for log_noise in new]
         if all(log_noise in values for log_noise in new):
             break
@@ -191,15 +187,11 @@ def _widened(
     )
     while len(values) < MAX_VALUES:
         ordered = sorted(values)
-        smallest_that_matters, (lowest, next_lowest), last = (
-            max(values.values()) - WIDENING_DROP,
-            ordered[:2],
-            ordered[-1],
-        )
-        if values[last] > smallest_that_matters and last + step <= ends[1]:
+        floor, (lowest, next_lowest), last = max(values.values()) - WIDENING_DROP, ordered[:2], ordered[-1]
+        if values[last] > floor and last + step <= ends[1]:
             values[last + step] = function(last + step)
         elif (
-            values[lowest] > smallest_that_matters
+            values[lowest] > floor
             and lowest - step >= ends[0]
             and values[lowest] - values[next_lowest] > -MIN_SLOPE * step
         ):

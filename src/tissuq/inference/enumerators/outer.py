@@ -200,10 +200,10 @@ def _largest_ratios(models: Sequence[StatisticalModel]) -> list[float]:
 
     Where the noise is known, so is about the largest that the data allow: most posteriors end there.
     """
-    if models[0].noise.parameters:
-        return [MAX_STRESS_RATIO]
-    of_data = max(float(np.sqrt((model.stress**2).mean())) / float(model.noise.sd({}, 0.0)) for model in models)
-    return [min(MAX_RATIO_TO_DATA * of_data, MAX_STRESS_RATIO), MAX_STRESS_RATIO]
+    of_data = np.inf
+    if not models[0].noise.parameters:
+        of_data = max(_size_of_data(model) / _most_noise(model) for model in models)
+    return sorted({min(MAX_RATIO_TO_DATA * of_data, MAX_STRESS_RATIO), MAX_STRESS_RATIO})
 
 
 def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
@@ -395,6 +395,9 @@ def _thinned(points: Points, count: int, offset: float) -> Points:
 
 def _most_noise(model: StatisticalModel) -> float:
     """Return the noise, or the most that it can be."""
-    if not model.noise.parameters:
-        return float(model.noise.sd({}, 0.0))
+    return _size_of_data(model) if model.noise.parameters else float(model.noise.sd({}, 0.0))
+
+
+def _size_of_data(model: StatisticalModel) -> float:
+    """Return the root mean square of the measured stresses."""
     return float(np.sqrt((model.stress**2).sum() / model.experiment.size))
