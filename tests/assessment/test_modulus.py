@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import tissuq as tq
 from marks import slow_but
+from tissuq.assessment.modulus import modulus
 
 STRETCH = np.linspace(0.75, 1.7, 20)
 
@@ -30,6 +33,14 @@ def test_it_is_that_of_the_draws(material, discrepancy):
     assert found.sd == pytest.approx(np.std(moduli), rel=0.3)  # 5 standard errors of a hundred draws
     low, high = found.hdi(0.5)
     assert 0.25 < np.mean((low < moduli) & (moduli < high)) < 0.75
+
+
+def test_a_single_draw_among_gaussians_takes_their_width():
+    solution = tq.fit(measured(), material="ogden-1", discrepancy="none", noise_sd=0.03).solution
+    mixture, root = solution.mixture, solution.mixture.root.copy()
+    root[0] = 0.0
+    found = modulus(replace(solution, represent=lambda: replace(mixture, root=root)))
+    assert found.hdi() == pytest.approx(modulus(solution).hdi(), rel=1e-3)
 
 
 def test_where_one_parameter_makes_it_it_is_that_one_scaled():

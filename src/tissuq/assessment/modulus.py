@@ -21,6 +21,8 @@ FloatArray = NDArray[np.float64]
 
 STRETCH_STEP = 1e-3
 """Step of the stretch for the initial slope."""
+LEAST_BANDWIDTH = 1e-6
+"""Of a single value without width, relative to it."""
 
 
 def modulus(solution: Solution) -> Marginal:
@@ -43,7 +45,8 @@ def modulus(solution: Solution) -> Marginal:
         marginal = marginal_of_mixture(mixture.weights[is_wide], means[is_wide], sds[is_wide])
         marginals.append((float(mixture.weights[is_wide].sum()), marginal))
     if not is_wide.all():
-        marginal = marginal_of_points(means[~is_wide], mixture.weights[~is_wide], bounds)
+        bandwidth = None if np.ptp(means[~is_wide]) else float(sds.max() or LEAST_BANDWIDTH * abs(means[0]))
+        marginal = marginal_of_points(means[~is_wide], mixture.weights[~is_wide], bounds, bandwidth)
         marginals.append((float(mixture.weights[~is_wide].sum()), marginal))
     return widened(blended(marginals, bounds), model.common_error)
 

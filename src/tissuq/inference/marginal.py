@@ -131,7 +131,7 @@ def marginal_of_points(
     bandwidth = bandwidth or 0.9 * sd * float(weights @ weights) ** 0.2
     low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
     is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
-    if not is_cut:
+    if not is_cut and sd > bandwidth:
         points = mean + (points - mean) * np.sqrt(1 - (bandwidth / sd) ** 2)
     heights, edges = np.histogram(points, bins=TABLE_POINTS - 1, range=(low, high), weights=weights, density=True)
     step = edges[1] - edges[0]

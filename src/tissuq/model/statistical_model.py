@@ -233,7 +233,13 @@ class StatisticalModel(ErrorModel):
 
     def design_at(self, bent: ArrayLike) -> FloatArray:
         """Return `basis` as `rows` (r, k), at values (s,) of `bent_symbols`."""
-        return np.asarray(self.rows(self.basis(self.states, bent)))
+        return np.asarray(self.designs_at(np.asarray(bent)[None])[0])
+
+    def designs_at(self, bent: ArrayLike) -> FloatArray:
+        """Return `basis` as `rows` (m, r, k), at m values (m, s) of `bent_symbols`."""
+        bases = self.basis(self.states, bent)
+        rows = np.asarray(self.rows(bases.swapaxes(0, 1).reshape(bases.shape[1], -1)))
+        return rows.reshape(len(rows), len(bases), -1).swapaxes(0, 1)
 
     def by_limits(self, member: NDArray[np.intp]) -> Iterator[tuple[Range, NDArray[np.intp]]]:
         """Yield the different ranges of the data of energy members (M,), and which of these have each.
@@ -316,8 +322,8 @@ class StatisticalModel(ErrorModel):
         """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
         states = self.experiment.states
         sample = states if self.whitening is not None else states.thinned(max(1, len(states) // CHUNK))
-        bent = np.array([[off_zero(prior, q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
-        bases = stress_basis(self.material, sample, bent)
+        bent = tuple(tuple(off_zero(prior, q) for prior in self._bent_priors()) for q in BENT_QUANTILES)
+        bases = _remembered_stress_basis(self.material, sample, bent)
         columns = np.array([self.white(basis) for basis in bases])
         return np.asarray(np.linalg.norm(columns, axis=1).min(axis=0) * np.sqrt(len(states) / len(sample)))
 
@@ -372,6 +378,7 @@ def _basis(material: Material, discrepancy: Discrepancy, states: States, bent: A
 
 
 _remembered_basis = lru_cache(maxsize=64)(_basis)
+_remembered_stress_basis = lru_cache(maxsize=64)(stress_basis)
 
 
 # The same for every noise, lag and tolerance of the same tests, of which the errors are estimated.

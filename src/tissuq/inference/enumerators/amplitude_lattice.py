@@ -249,7 +249,7 @@ class _EnergySums:
         width = len(self.model.linear) + max(sum(f.shape[1] for f in blocks) for blocks in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
         for number in np.unique(node):
-            rows = self._outer.rows(self._nodes[number].outer)
+            rows = self._outer.rows(self._nodes[number].outer[None])
             for member in np.unique(points.lattice[node == number]):
                 of_member = np.flatnonzero((node == number) & (points.lattice == member))
                 amplitudes = points.amplitudes[of_member][:, list(self.model.energy_members[member].amplitude_indices)]

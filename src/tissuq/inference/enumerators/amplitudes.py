@@ -21,6 +21,7 @@ __all__ = [
     "Points",
     "Weighing",
     "at_end",
+    "known_log_weights",
     "linear_at",
     "log_prior_of_amplitude",
     "log_prior_of_noise",
@@ -35,8 +36,9 @@ NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
 1 / sqrt(2 freedom); above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
 CUT_NODES = 24
 """Values of the noise where its prior cuts or is narrow."""
-IRRELEVANT_LOG_DROP = 18.0
-"""Log density below the largest, at the best noise, at which a point of a lattice is left out at once."""
+IRRELEVANT_LOG_DROP, NEGLIGIBLE_LOG_DROP = 18.0, 26.0
+"""Log density below the largest, at the best noise, at which a point of a lattice is left out at once; and at which
+all such points together hold nothing."""
 NEGLIGIBLE_SHARE = 1e-6
 """Share of the posterior that may be left out."""
 NOISE_TRIALS, HARDLY_PULLED_RISE = 8, 0.1
@@ -95,6 +97,9 @@ class Weighing:
         Of the data set in the lattices.
     ratios : mapping of str to float
         Values, over noise_sd, of the other parameters of the noise.
+    log_weights : sequence of (G2, G1) array, optional
+        Of the data set on each lattice, as `known_log_weights` has them, where the noise is known; for several data
+        sets of one model they are quicker to compute together.
     """
 
     def __init__(
@@ -103,8 +108,10 @@ class Weighing:
         lattices: Sequence[Lattice],
         index: int,
         ratios: Mapping[str, float] = MappingProxyType({}),
+        log_weights: Sequence[FloatArray] | None = None,
     ) -> None:
         self._model, self._lattices, self._index, self._ratios = model, lattices, index, ratios
+        self._log_weights, self._least_log_weight = log_weights, -np.inf
         self._ends, self._priors = _ends(model, ratios), LinearPriors(model)
         self._is_pulled = self._priors.is_gaussian
 
@@ -147,8 +154,11 @@ class Weighing:
 
     def _at_known_noise(self) -> list[Points]:
         """Return the points that matter of every lattice at the known noise, of which only these are made."""
-        noise_sd = float(self._model.noise.sd({}, 0.0))
-        logs = [self._log_weights(lattice, noise_sd) for lattice in self._lattices]
+        noise_sd, logs = float(self._model.noise.sd({}, 0.0)), self._log_weights
+        if logs is None:
+            data_set = slice(self._index, self._index + 1)
+            logs = [known_log_weights(self._model, lattice, data_set)[:, :, 0] for lattice in self._lattices]
+            self._log_weights = logs
         top = max(log_weights.max() for log_weights in logs)
         masses = [np.exp(log_weights - top) for log_weights in logs]
         least_mass = max(
@@ -156,35 +166,37 @@ class Weighing:
         )
         points_of_members = []
         for member, (lattice, mass) in enumerate(zip(self._lattices, masses, strict=True)):
-            second_index, first_index = np.nonzero(mass >= least_mass)
-            misfit = lattice.misfit[second_index, first_index, self._index]
-            noise = np.full(len(misfit), noise_sd)
-            points_of_members.append(self._weighed(member, second_index, first_index, misfit, noise))
+            indices = np.nonzero(mass >= least_mass)
+            misfit = lattice.misfit[(*indices, self._index)]
+            amplitudes, nothing = np.zeros((len(misfit), len(self._model.energy_symbols))), np.zeros(len(misfit))
+            pairs = zip(lattice.ratios, indices[::-1], strict=True)
+            for amplitude, (grid, place) in zip(lattice.member.amplitude_indices, pairs, strict=False):
+                amplitudes[:, amplitude] = grid[place] * noise_sd
+            arrays = np.full(len(misfit), noise_sd), amplitudes, logs[member][indices], misfit, nothing, nothing
+            points_of_members.append(Points(np.full(len(misfit), member), indices[0], indices[1], *arrays))
         return points_of_members
 
-    def _log_weights(self, lattice: Lattice, noise_sd: float) -> FloatArray:
-        """Return the log weights (G2, G1) of all points of a lattice at one noise, where nothing pulls."""
-        log_weights = lattice.log_likelihoods(self._index, noise_sd) + np.log(lattice.member.probability)
-        for amplitude, grid, axis in zip(lattice.member.amplitude_indices, lattice.ratios, (1, 0), strict=False):
-            prior = self._model.priors[self._model.energy_symbols[amplitude]]
-            of_grid = log_prior_of_amplitude(prior, grid * noise_sd) + _log_cells(np.arange(len(grid)), lattice.step)
-            log_weights += np.expand_dims(of_grid, 1 - axis)
-        return np.asarray(log_weights)
-
     def _are_cut(self, point_sets: Sequence[Points]) -> bool:
-        """Return whether the bounds of linear parameters take away much."""
+        """Return whether the bounds of linear parameters take away much; and learn below which weight nothing matters.
+
+        At a known noise: bounds only take away.
+        """
         box = self._priors.box
         if not (np.isfinite(box.lower).any() or np.isfinite(box.upper).any()):
             return False
         points, mass = Points.joined(point_sets), np.concatenate(_masses(point_sets))
         mean, root = linear_at(self._lattices, self._index, points)
         ceiling = box.ceiling(mean, root * points.noise_sd[:, None, None])
+        if not self._model.noise.parameters:
+            self._least_log_weight = float((points.log_weight + ceiling).max()) - NEGLIGIBLE_LOG_DROP
         return float(mass @ np.exp(ceiling)) < HARDLY_CUT_SHARE * float(mass.sum())
 
     def _best_noise(self, member: int) -> Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
         lattice, noise = self._lattices[member], self._model.noise
         second_index, first_index = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
+        if self._log_weights is not None:
+            second_index, first_index = np.nonzero(self._log_weights[member] >= self._least_log_weight)
         misfit = lattice.misfit[second_index, first_index, self._index]
         if not noise.parameters:
             return self._weighed(
@@ -256,6 +268,20 @@ class Weighing:
         return Points(
             member_of_point, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside
         )
+
+
+def known_log_weights(model: StatisticalModel, lattice: Lattice, data_sets: slice) -> FloatArray:
+    """Return the log weights (G2, G1, b) of some data sets at all points of a lattice at the known noise of a model.
+
+    As if the linear parameters had no priors.
+    """
+    noise_sd, member = float(model.noise.sd({}, 0.0)), lattice.member
+    log_weights = lattice.log_likelihoods(data_sets, noise_sd) + np.log(member.probability)
+    for amplitude, grid, axes in zip(member.amplitude_indices, lattice.ratios, ((0, 2), (1, 2)), strict=False):
+        prior = model.priors[model.energy_symbols[amplitude]]
+        of_grid = log_prior_of_amplitude(prior, grid * noise_sd) + _log_cells(np.arange(len(grid)), lattice.step)
+        log_weights += np.expand_dims(of_grid, axes)
+    return np.asarray(log_weights)
 
 
 def _counts(lattices: Sequence[Lattice], points: Points) -> NDArray[np.intp]:

@@ -34,12 +34,14 @@ FACTORS_AT_ONCE = 8
 class Rows:
     """Measurements over their relative noise, with everything given but linear parameters, amplitudes and noise_sd.
 
+    Of D designs, which differ by the exponents of the material, with as many data sets each: B = D k in all.
+
     Attributes
     ----------
-    design : (n, p) array
+    design : (D, n, p) array
         Stresses of unit linear parameters.
-    stresses : (n, B) array
-        Of B data sets.
+    stresses : (D, n, k) array
+        Of the data sets.
     scale : (n,) array
         Noise of every measurement over noise_sd; stresses are divided by it already.
     count : int
@@ -53,37 +55,42 @@ class Rows:
 
     @cached_property
     def fit(self) -> LeastSquares:
-        """The least-squares fit of the linear parameters, the same for all members."""
+        """The least-squares fits of the linear parameters, the same for all members."""
         basis, triangle = np.linalg.qr(self.design)
-        centre = basis.T @ self.stresses
-        log_size = np.log(np.abs(np.diag(triangle))).sum() + np.log(self.scale).sum()
-        columns = np.hstack([basis, self.stresses - basis @ centre])
-        return LeastSquares(np.linalg.inv(triangle), centre, columns, float(log_size))
+        centre = basis.swapaxes(1, 2) @ self.stresses
+        log_size = np.log(np.abs(np.diagonal(triangle, 0, 1, 2))).sum(axis=1) + np.log(self.scale).sum()
+        columns = np.concatenate([basis, self.stresses - basis @ centre], axis=2)
+        return LeastSquares(np.linalg.inv(triangle), centre, columns, log_size)
 
 
 class LeastSquares(NamedTuple):
-    """A fit of p linear parameters to B data sets, in an orthonormal basis of their stresses.
+    """Fits of p linear parameters to the data sets, in an orthonormal basis of the stresses of each design.
 
     Attributes
     ----------
-    inverse : (p, p) array
+    inverse : (D, p, p) array
         Inverse of the triangle that turns the basis into the stresses of unit parameters.
-    centre : (p, B) array
-        The fit, in that basis.
-    columns : (n, p + B) array
+    centre : (D, p, k) array
+        The fits, in that basis.
+    columns : (D, n, p + k) array
         The basis, and what the fit leaves of the data.
-    log_size : float
+    log_size : (D,) array
         Log of the determinants of the triangle and of the scale of the noise.
     """
 
     inverse: FloatArray
     centre: FloatArray
     columns: FloatArray
-    log_size: float
+    log_size: FloatArray
+
+    @property
+    def left(self) -> FloatArray:
+        """What is left of the data sets, (D, n, k)."""
+        return self.columns[:, :, self.inverse.shape[1] :]
 
 
 class Reduced:
-    """The rows of B data sets and the features of one member, as a QR triangle.
+    """The rows of one design and the features of one member, as a QR triangle.
 
     Parameters
     ----------
@@ -93,11 +100,12 @@ class Reduced:
     """
 
     def __init__(self, rows: Rows, features: list[FloatArray]) -> None:
-        self._parameters = rows.design.shape[1]
+        (design,), (stresses,) = rows.design, rows.stresses
+        self._parameters = design.shape[1]
         self._sizes = [block.shape[1] for block in features]
-        columns = np.hstack([rows.design, *(block / rows.scale[:, None] for block in features)])
+        columns = np.hstack([design, *(block / rows.scale[:, None] for block in features)])
         basis, self._triangle = np.linalg.qr(columns)
-        self._data = basis.T @ rows.stresses
+        self._data = basis.T @ stresses
 
     def linear_and_weights(
         self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray
@@ -193,7 +201,8 @@ class Directions:
 class Lattice:
     """The posteriors of B data sets under one member, at every pair of ratios of its amplitudes to the noise.
 
-    Points of the lattice are addressed by the places of the second block's ratio and of the first one's, (M,) each.
+    Points of the lattice are addressed by the places of the second block's ratio and of the first one's, (M,) each;
+    data sets by their number, those of one design after another.
 
     Parameters
     ----------
@@ -208,64 +217,73 @@ class Lattice:
         Measurements less linear parameters.
     misfit : (G2, G1, B) array, MPa^2
         Sum of squares of the data given the ratios, in units of the noise.
-    log_size : (G2, G1) array
+    log_size : (G2, G1, D) array
         Half the log determinant of everything but the noise.
     """
 
     def __init__(self, directions: Directions, rows: Rows) -> None:
         self.member, self.ratios, self.step = directions.member, directions.ratios, directions.step
-        self.parameters = rows.design.shape[1]
-        self.freedom = rows.count - self.parameters
+        designs, count, p = rows.design.shape
+        k = rows.stresses.shape[2]
+        self.parameters, self.freedom, self._per_design = p, rows.count - p, k
         # The material's part of the data and what it leaves, within the span of the features and outside.
         fit = rows.fit
         self._inverse, self._centre = fit.inverse, fit.centre
-        inside = directions.basis.T @ fit.columns
-        outside = fit.columns - directions.basis @ inside
-        (along, remaining), p = directions.along(inside), self.parameters
+        columns = fit.columns.swapaxes(0, 1).reshape(count, designs * (p + k))
+        inside = directions.basis.T @ columns
+        outside = columns - directions.basis @ inside
+        parts = (*directions.along(inside), outside)
+        along, remaining, outside = (part.reshape(*part.shape[:-1], designs, p + k) for part in parts)
         # A sum along the directions, for each of their variances, of every product that is needed.
         products = _products(along, p)
-        of_unit_variance = _summed_products(remaining, p) + _summed_products(outside[None], p)
-        sums = (1 / directions.variance) @ products + of_unit_variance[:, None]
-        of_design, size = np.split(sums, [p * along.shape[2]], axis=2)
-        of_design = of_design.reshape(*of_design.shape[:2], p, along.shape[2])
-        precision, pull = np.split(of_design, [p], axis=3)
-        tiny = 1e-15 * np.trace(precision, axis1=2, axis2=3)[:, :, None, None] * np.eye(p)
+        of_unit_variance = _summed_products(remaining, p) + _summed_products(outside, p)
+        width = products.shape[3]
+        sums = (1 / directions.variance) @ products.reshape(*products.shape[:2], designs * width)
+        sums = sums.reshape(*sums.shape[:2], designs, width) + of_unit_variance[:, None]
+        of_design, size = np.split(sums, [p * (p + k)], axis=3)
+        of_design = of_design.reshape(*of_design.shape[:3], p, p + k)
+        precision, pull = np.split(of_design, [p], axis=4)
+        tiny = 1e-15 * np.trace(precision, axis1=3, axis2=4)[..., None, None] * np.eye(p)
         gaussian = integrated(precision + tiny, pull, size)
         self._root, self._scores = gaussian.root, gaussian.scores
-        self.misfit = np.maximum(gaussian.misfit, 0.0)
-        self.log_size = directions.log_size - gaussian.log_volume + fit.log_size
+        self.misfit = np.maximum(gaussian.misfit, 0.0).reshape(*size.shape[:2], designs * k)
+        self.log_size = directions.log_size[:, :, None] - gaussian.log_volume + fit.log_size
 
     def log_likelihood(
         self, data_set: int, second_index: Places, first_index: Places, noise_sd: FloatArray
     ) -> FloatArray:
         """Return log p(y | ratios, noise_sd) (M,), the linear parameters integrated with density one."""
         exponent = 0.5 * self.misfit[second_index, first_index, data_set] / noise_sd**2
-        log_noise = np.log(noise_sd) + 0.5 * log(2 * pi)
-        return np.asarray(-self.freedom * log_noise - exponent - self.log_size[second_index, first_index])
+        log_noise, log_size = np.log(noise_sd) + 0.5 * log(2 * pi), self.log_size[:, :, data_set // self._per_design]
+        return np.asarray(-self.freedom * log_noise - exponent - log_size[second_index, first_index])
 
-    def log_likelihoods(self, data_set: int, noise_sd: float) -> FloatArray:
-        """Return `log_likelihood` (G2, G1) at all points of the lattice, at one noise."""
+    def log_likelihoods(self, data_sets: slice, noise_sd: float) -> FloatArray:
+        """Return `log_likelihood` (G2, G1, b) of some data sets at all points of the lattice, at one noise."""
         log_noise = log(noise_sd) + 0.5 * log(2 * pi)
-        return np.asarray(-self.freedom * log_noise - 0.5 / noise_sd**2 * self.misfit[:, :, data_set] - self.log_size)
+        log_size = np.repeat(self.log_size, self._per_design, axis=2)[:, :, data_sets]
+        return np.asarray(-self.freedom * log_noise - 0.5 / noise_sd**2 * self.misfit[:, :, data_sets] - log_size)
 
     def linear(self, data_set: int, second_index: Places, first_index: Places) -> tuple[FloatArray, FloatArray]:
         """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise."""
-        root = self._root[second_index, first_index]
-        shift = (root @ self._scores[second_index, first_index, :, data_set][:, :, None])[:, :, 0]
-        return (self._centre[:, data_set] + shift) @ self._inverse.T, self._inverse @ root
+        design, number = divmod(data_set, self._per_design)
+        root = self._root[second_index, first_index, design]
+        shift = (root @ self._scores[second_index, first_index, design, :, number][:, :, None])[:, :, 0]
+        inverse = self._inverse[design]
+        return (self._centre[design, :, number] + shift) @ inverse.T, inverse @ root
 
 
 def _products(columns: FloatArray, count: int) -> FloatArray:
-    """Return products of p columns with all p + B of (..., m, p + B), and squares of the last B, one after another."""
+    """Return products of p columns with all p + k of (..., D, p + k), and squares of the last k, one after another."""
     with_design = columns[..., :count, None] * columns[..., None, :]
     shape = *columns.shape[:-1], count * columns.shape[-1]
     return np.concatenate([with_design.reshape(shape), columns[..., count:] ** 2], axis=-1)
 
 
 def _summed_products(columns: FloatArray, count: int) -> FloatArray:
-    """Return the `_products` of columns (..., m, p + B), summed over their m rows."""
+    """Return the `_products` of columns (..., m, D, p + k), summed over their m rows."""
+    columns = columns.swapaxes(-3, -2)
     with_design = columns[..., :count].swapaxes(-1, -2) @ columns
-    shape = *columns.shape[:-2], count * columns.shape[-1]
+    shape = *with_design.shape[:-2], count * columns.shape[-1]
     return np.concatenate([with_design.reshape(shape), (columns[..., count:] ** 2).sum(axis=-2)], axis=-1)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 __all__ = ["FINE", "ROUGH", "Accuracy", "Line", "first_places", "known_along", "peaks"]
 
 FloatArray = NDArray[np.float64]
+LogDensity = Callable[[FloatArray], FloatArray]
 
 FIRST_END, FIRST_PLACES = 4.0, 17
 """Where a search begins on either side of zero, and with how many places."""
@@ -119,22 +120,22 @@ class Line:
         return np.unique(np.interp(accuracy.probabilities, cumulative, points))
 
 
-def peaks(log_density: Callable[[float], float], end: float) -> FloatArray:
+def peaks(log_density: LogDensity, end: float) -> FloatArray:
     """Return the places of the largest peaks of a density that costs little, each with one on either side of it.
 
     These are about a standard deviation away.
     """
     grid = np.linspace(-end, end, PEAK_PLACES)
-    logs = np.nan_to_num([log_density(point) for point in grid], nan=-1e300, neginf=-1e300)
+    logs = np.nan_to_num(log_density(grid), nan=-1e300, neginf=-1e300)
     inner = logs[1:-1]
     tops = 1 + np.flatnonzero((inner >= logs[:-2]) & (inner > logs[2:]) & (inner > logs.max() - MAX_PEAK_DROP))
     return np.array([point for top in tops for point in _about(log_density, grid[top], grid[1] - grid[0])])
 
 
-def _about(log_density: Callable[[float], float], top: float, step: float) -> FloatArray:
+def _about(log_density: LogDensity, top: float, step: float) -> FloatArray:
     """Return a peak near a place, by parabolas, and places a standard deviation beside it."""
     for _ in range(PARABOLAS):
-        value_before, value, value_after = (log_density(top + side * step) for side in (-1, 0, 1))
+        value_before, value, value_after = log_density(top + step * np.array([-1.0, 0.0, 1.0]))
         curvature = max((2 * value - value_before - value_after) / step**2, 1e-12)
         top += float(np.clip((value_after - value_before) / (2 * step * curvature), -step, step))
         step = min(0.5 * step, curvature**-0.5)
@@ -154,15 +155,13 @@ def first_places() -> FloatArray:
     return np.linspace(-FIRST_END, FIRST_END, FIRST_PLACES)
 
 
-def known_along(
-    log_density: Callable[[float], float], places: Iterable[float], end: float, accuracy: Accuracy = FINE
-) -> Line:
+def known_along(log_density: LogDensity, places: Iterable[float], end: float, accuracy: Accuracy = FINE) -> Line:
     """Return a density at places, more than at first where it changes fast, and matters, and beyond them.
 
     Parameters
     ----------
     log_density : callable
-        Returns the logarithm of the density at a place.
+        Returns the logarithms (k,) of the density at ascending places (k,).
     places : iterable of float
     end : float
         No place is farther from zero.
@@ -171,7 +170,7 @@ def known_along(
     log_densities: dict[float, float] = {}
     new = set(_apart(np.unique(np.clip(list(places), -end, end))).tolist())
     while new and len(log_densities) < MAX_PLACES:
-        log_densities |= {point: log_density(point) for point in sorted(new)}
+        log_densities |= dict(zip(sorted(new), log_density(np.array(sorted(new))).tolist(), strict=True))
         ordered = np.array(sorted(log_densities))
         logs = np.nan_to_num([log_densities[point] for point in ordered], nan=-np.inf)
         logs = np.maximum(logs, logs.max() - MAX_DROP)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.amplitudes import Points, Weighing, at_end, linear_at
+from tissuq.inference.enumerators.amplitudes import Points, Weighing, at_end, known_log_weights, linear_at
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, MAX_STRESS_RATIO, Directions, Lattice, Rows
 from tissuq.inference.enumerators.line import FINE, Accuracy, Line, first_places, known_along, peaks
 from tissuq.inference.marginal import Marginal, marginal_of_table
@@ -39,6 +39,8 @@ OUTER_STEP, BEGINNINGS = 2 * LOG_RATIO_STEP, 2
 are of either sign and cancel."""
 MAX_POINTS_OF_NODE, MAX_POINTS = 2000, 60_000
 """Points kept of each value, and where there are no outer parameters."""
+SETTINGS_AT_ONCE = 32
+"""Values of which the lattices are computed together, which bounds the memory."""
 SCOUT_MEMBERS = 6
 """Members, about, whose posterior guides the search for the values."""
 GUIDED_DIVISOR = 8
@@ -102,18 +104,28 @@ class Outer:
         pairs = zip(self.symbols, settings, self.of_noise, strict=True)
         return {symbol: float(value) for symbol, value, of_noise in pairs if of_noise}
 
+    def alike(self, settings: FloatArray, most: int) -> Iterator[NDArray[np.intp]]:
+        """Yield the rows of settings (N, d), so many at once at the most, of which the relative noise is the same."""
+        most = 1 if self.of_noise.any() else most
+        return iter(np.split(np.arange(len(settings)), range(most, len(settings), most)))
+
     def rows(self, settings: FloatArray) -> Rows:
-        """Return the measurements with these parameters given."""
+        """Return the measurements with these parameters given, (D, d), of which the relative noise is the same."""
         model = self._model
-        values = dict(zip(self.symbols, map(float, settings), strict=True))
-        scale = np.asarray(model.noise.sd(values | {"noise_sd": 1.0}, model.levels)) if self.of_noise.any() else 1.0
+        values = dict(zip(self.symbols, settings.T, strict=True))
+        of_noise = {symbol: float(values[symbol][0]) for symbol in np.array(self.symbols)[self.of_noise]}
+        scale = np.asarray(model.noise.sd(of_noise | {"noise_sd": 1.0}, model.levels)) if of_noise else 1.0
         scale = np.broadcast_to(scale, len(model.stress)).astype(float)
         bent = [values[symbol] for symbol in model.bent_symbols]
-        basis = model.design_at(bent) if bent else model.design
+        basis = (
+            model.designs_at(np.column_stack(bent)) if bent else np.repeat(model.design[None], len(settings), axis=0)
+        )
         is_linear = np.isin(model.column_symbols, model.linear)
-        known_stress = basis[:, ~is_linear] @ [values[symbol] for symbol in np.array(model.column_symbols)[~is_linear]]
-        stresses = (model.stress - known_stress) / scale
-        return Rows(basis[:, is_linear] / scale[:, None], stresses[:, None], scale, model.experiment.size)
+        fixed = [values[symbol] for symbol in np.array(model.column_symbols)[~is_linear]]
+        stresses = np.repeat(model.stress[None, :, None], len(settings), axis=0)
+        if fixed:
+            stresses = stresses - basis[:, :, ~is_linear] @ np.column_stack(fixed)[:, :, None]
+        return Rows(basis[:, :, is_linear] / scale[:, None], stresses / scale[:, None], scale, model.experiment.size)
 
 
 def relative_error(outer: Outer, log_masses: FloatArray, min_effective: float) -> float:
@@ -181,7 +193,7 @@ class Node:
 def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     """Return the posteriors of models on the same stretches that have no outer parameters."""
     stresses = np.array([model.stress for model in models]).T
-    rows = Rows(models[0].design, stresses, np.ones(len(stresses)), models[0].experiment.size)
+    rows = Rows(models[0].design[None], stresses[None], np.ones(len(stresses)), models[0].experiment.size)
     terms, members = _Terms(models), range(len(models[0].energy_members))
     for largest in _largest_ratios(models):
         lattices = [Lattice(terms.directions(member, rows.scale, largest=largest), rows) for member in members]
@@ -231,13 +243,14 @@ class _Search:
         """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
         places = guide.places
         if places is None:
-            scout = known_along(lambda place: self._scouted(np.array([place])), first_places(), MAX_SCORE)
+            scout = known_along(lambda some: self._scouted(some[:, None]), first_places(), MAX_SCORE)
             places = scout.spread(guide.accuracy)
         nodes: dict[float, Node] = {}
 
-        def log_density(place: float) -> float:
-            nodes[place] = self._node(np.array([place]))
-            return nodes[place].log_mass + self._outer.log_base(np.array([place]))
+        def log_density(some: FloatArray) -> FloatArray:
+            new = self._nodes(some[:, None])
+            nodes.update(zip(some.tolist(), new, strict=True))
+            return self._log_masses(new, some[:, None])
 
         self._leave_out_members(places[[len(places) // 2]])
         places = np.concatenate([places, self._peaks(guide)])
@@ -253,13 +266,13 @@ class _Search:
         model = self._sums.model
         freedom, noise = model.experiment.size - len(model.linear), model.noise
 
-        def log_likelihood(place: float) -> float:
-            rows = self._outer.rows(self._outer.settings(np.array([place])))
-            basis, _ = np.linalg.qr(rows.design)
-            misfit = float(((rows.stresses - basis @ (basis.T @ rows.stresses)) ** 2).sum())
+        def log_likelihood(some: FloatArray) -> FloatArray:
+            settings, misfit = self._settings(some[:, None]), np.empty(len(some))
+            for rows in self._outer.alike(settings, len(settings)):
+                misfit[rows] = (self._outer.rows(settings[rows]).fit.left ** 2).sum(axis=(1, 2))
             if noise.parameters:
-                return -0.5 * freedom * float(np.log(max(misfit, TINY)))
-            return -0.5 * misfit / float(noise.sd({}, 0.0)) ** 2
+                return np.asarray(-0.5 * freedom * np.log(np.maximum(misfit, TINY)))
+            return np.asarray(-0.5 * misfit / float(noise.sd({}, 0.0)) ** 2)
 
         if guide.peaks is None:
             guide.peaks = peaks(log_likelihood, MAX_SCORE / 2)
@@ -270,15 +283,15 @@ class _Search:
         d = len(self._outer.symbols)
         start = guide.proposal
         if start is None:
-            start = adapted(lambda points: np.array([self._scouted(point) for point in points]), d).proposal
+            start = adapted(self._scouted, d).proposal
         self._check_place(start.mean)
         self._leave_out_members(start.mean)
         nodes = list[Node]()
 
         def log_masses(points: FloatArray) -> FloatArray:
-            nodes.extend(self._node(point) for point in points)
-            bases = [self._outer.log_base(point) for point in points]
-            return np.array([node.log_mass for node in nodes[-len(points) :]]) + bases
+            new = self._nodes(points)
+            nodes.extend(new)
+            return self._log_masses(new, points)
 
         count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
         min_effective = guide.accuracy.min_effective
@@ -287,18 +300,28 @@ class _Search:
         error = relative_error(self._outer, adaptation.log_weights, min_effective)
         return *_weighted(nodes, adaptation.log_weights - np.log(len(nodes))), error
 
-    def _scouted(self, point: FloatArray) -> float:
-        """Return the logarithm of the density at a point (d,), roughly: from a few of the members."""
+    def _scouted(self, points: FloatArray) -> FloatArray:
+        """Return the logarithms of the density at points (N, d), roughly: from a few of the members."""
         scouts = self._members[:: -(-len(self._members) // SCOUT_MEMBERS)]
-        points = self._sums.points(self._outer.settings(point), scouts)
-        return float(np.logaddexp.reduce(points.log_weight)) + self._outer.log_base(point)
+        sums = self._sums.points(self._settings(points), scouts)
+        return np.asarray(self._bases(points) + [np.logaddexp.reduce(of_point.log_weight) for of_point in sums])
 
-    def _node(self, point: FloatArray) -> Node:
-        return self._sums.node(self._outer.settings(point), self._members)
+    def _nodes(self, points: FloatArray) -> list[Node]:
+        return self._sums.nodes(self._settings(points), self._members)
+
+    def _log_masses(self, nodes: Sequence[Node], points: FloatArray) -> FloatArray:
+        """Return the logarithms of the density at points (N, d), given the nodes there."""
+        return np.asarray(self._bases(points) + [node.log_mass for node in nodes])
+
+    def _settings(self, points: FloatArray) -> FloatArray:
+        return np.array([self._outer.settings(point) for point in points])
+
+    def _bases(self, points: FloatArray) -> FloatArray:
+        return np.array([self._outer.log_base(point) for point in points])
 
     def _leave_out_members(self, point: FloatArray) -> None:
         """Leave out members that have next to no mass at a point (d,) in the middle of the posterior."""
-        points = self._sums.points(self._outer.settings(point), self._members)
+        (points,) = self._sums.points(self._settings(point[None]), self._members)
         masses = np.bincount(points.lattice, np.exp(points.log_weight - points.log_weight.max()), len(self._members))
         order = np.argsort(masses)
         self._members = np.sort(order[np.cumsum(masses[order]) > NEGLIGIBLE_MEMBERS * masses.sum()])
@@ -358,22 +381,43 @@ class _Sums:
         self._terms = _Terms([model])
         self._known: dict[tuple[int, int], Directions] = {}
 
-    def points(self, settings: FloatArray, members: Places) -> Points:
-        """Return the points that matter; ``lattice`` is a place among the members."""
-        return Weighing(self.model, self._lattices(settings, members), 0, self._outer.ratios(settings)).points()[0]
+    def points(self, settings: FloatArray, members: Places) -> list[Points]:
+        """Return the points that matter at settings (N, d); ``lattice`` is a place among the members."""
+        return [weighing.points()[0] for _, _, weighing in self._weighings(settings, members)]
 
-    def node(self, settings: FloatArray, members: Places) -> Node:
-        """Return the posterior of all but the outer parameters, by few points of the same weight."""
-        lattices, ratios = self._lattices(settings, members), self._outer.ratios(settings)
-        points, error = Weighing(self.model, lattices, 0, ratios).points()
-        points = _thinned(points, MAX_POINTS_OF_NODE, GOLDEN_RATIO * self._calls % 1)
-        mean, root = linear_at(lattices, 0, points)
-        return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)
+    def nodes(self, settings: FloatArray, members: Places) -> list[Node]:
+        """Return the posteriors at settings (N, d) of all but these, by few points of the same weight."""
+        first_call, nodes = self._calls + 1, list[Node]()
+        for lattices, index, weighing in self._weighings(settings, members):
+            of_setting, call = settings[len(nodes)], first_call + len(nodes)
+            points, error = weighing.points()
+            points = _thinned(points, MAX_POINTS_OF_NODE, GOLDEN_RATIO * call % 1)
+            mean, root = linear_at(lattices, index, points)
+            points = replace(points, lattice=members[points.lattice])
+            nodes.append(Node(points, mean, root, error, of_setting, self._outer.ratios(of_setting)))
+        return nodes
 
-    def _lattices(self, settings: FloatArray, members: Places) -> list[Lattice]:
-        rows, turn = self._outer.rows(settings), self._calls % BEGINNINGS
-        self._calls += 1
-        return [Lattice(self._directions(rows.scale, int(member), turn), rows) for member in members]
+    def _weighings(self, settings: FloatArray, members: Places) -> Iterator[tuple[list[Lattice], int, Weighing]]:
+        """Yield the posterior at each setting (N, d), the lattices behind it, and its number there.
+
+        Lattices begin at other amplitudes in turn.
+        """
+        for rows in self._outer.alike(settings, SETTINGS_AT_ONCE):
+            turns = (self._calls + np.arange(len(rows))) % BEGINNINGS
+            self._calls += len(rows)
+            of_turns = [self._of_turn(settings[rows[turns == turn]], members, turn) for turn in range(BEGINNINGS)]
+            yield from (next(of_turns[turn]) for turn in turns)
+
+    def _of_turn(
+        self, settings: FloatArray, members: Places, turn: int
+    ) -> Iterator[tuple[list[Lattice], int, Weighing]]:
+        rows, ratios = self._outer.rows(settings), self._outer.ratios(settings[0])
+        lattices = [Lattice(self._directions(rows.scale, int(member), turn), rows) for member in members]
+        is_known = not self.model.noise.parameters
+        logs = [known_log_weights(self.model, lattice, slice(None)) for lattice in lattices] if is_known else []
+        for index in range(len(settings)):
+            of_setting = [log_weights[:, :, index] for log_weights in logs] or None
+            yield lattices, index, Weighing(self.model, lattices, index, ratios, of_setting)
 
     def _directions(self, scale: FloatArray, member: int, turn: int) -> Directions:
         """Return the directions of one member, remembered while the relative noise stays the same."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from tissuq.mechanics.arithmetic import library, log, log_left, sqrt
+from tissuq.mechanics.arithmetic import expm1, library, log, log_left, sqrt
 from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform, Uniform
@@ -157,5 +157,5 @@ class ExtendedTube(StretchMaterial):
         crosslinks, confinement, limit, beta = values
         x = sum(stretch * stretch for stretch in stretches) - 3
         chains = (1 - 1 / limit) * x / (1 - x / limit) + log_left(x / limit)
-        tube = sum(stretch**-beta for stretch in stretches) - 3
+        tube = sum(expm1(-beta * log(stretch)) for stretch in stretches)
         return 0.5 * crosslinks * chains + 2 * confinement / beta**2 * tube
