@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.optimize import brentq
 
@@ -38,6 +42,14 @@ def test_every_law_has_the_numbers_of_its_own_fit(compared, single):
         assert row.stable == min(assessment.stable.values())
         low, high = posterior.initial_shear_modulus.hdi()
         assert (row.modulus_low, row.modulus_high) == (low, high)
+
+
+def test_laws_that_are_divided_among_processes_have_the_same_numbers(compared):
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        divided = tq.fit_laws(DATA, NAMES, pool=pool, **OPTIONS)
+    pd.testing.assert_frame_equal(divided.table.drop(columns="seconds"), compared.table.drop(columns="seconds"))
+    assert divided.modulus.hdi() == compared.modulus.hdi()
+    assert divided.predict(1.2).equals(compared.predict(1.2))
 
 
 def test_probabilities_and_differences_are_those_of_the_numbers(compared, single):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from filecmp import cmp
 from functools import partial
@@ -28,11 +29,12 @@ __all__ = ["fit"]
 
 
 class FitOptions(Written):
-    """How files are taken, and how the run is written."""
+    """How files are taken, among how many processes several laws are divided, and how the run is written."""
 
     specimen: tuple[str, ...] = option(
         (), "Name of the specimen, once for each of several files [each its own].", group="Reading files"
     )
+    workers: int | None = option(None, "Processes on this machine [one a core].", ge=1)
 
 
 @command(SpecimenSettings, FitOptions)
@@ -114,7 +116,7 @@ def _compare_laws(
 
     study = call.carried_out(
         target,
-        lambda step: run_laws(settings, call.beside, step, own, readings),
+        lambda step: run_laws(settings, call.beside, step, own, readings, call.how.workers or os.cpu_count() or 1),
         partial(law_result, sources=sources),
     )
     _print_omissions(study)

@@ -25,8 +25,8 @@ MASS_ROUNDING = 1e-15
 """Rounding error of the closed form for the mass of two parameters within bounds."""
 MAX_ROUNDING_ERROR = 1e-7
 """Relative error up to which rounding is borne with."""
-MAX_SCORE = 38.0
-"""Standard deviations beyond which a parameter never is."""
+MAX_SCORE, CERTAIN_SCORE = 38.0, 9.0
+"""Standard deviations beyond which a parameter never is, and below which it is but for 1e-19."""
 GRID_POINTS, MAX_ZOOMS, HALVINGS = 16, 12, 12
 """Points of a grid that zooms in on the density, how often at most, and halvings of what is then left."""
 PIECES = 4
@@ -172,10 +172,15 @@ def _rectangle(triangle: FloatArray, low: FloatArray, high: FloatArray) -> Float
     correlation, complement = triangle[:, 1].T / sd[:, 1]
 
     def probability_below(h: FloatArray, k: FloatArray) -> FloatArray:
-        value = 0.5 * (ndtr(h) + ndtr(k)) - np.where(h * k < 0, 0.5, 0.0)
+        value = np.where(h >= CERTAIN_SCORE, ndtr(k), np.where(k >= CERTAIN_SCORE, ndtr(h), 0.0))
+        inner = np.flatnonzero(np.maximum(np.abs(h), np.abs(k)) < CERTAIN_SCORE)
+        h, k = h[inner], k[inner]
+        both = 0.5 * (ndtr(h) + ndtr(k)) - np.where(h * k < 0, 0.5, 0.0)
         with np.errstate(over="ignore"):
-            value -= owens_t(h, (k - correlation * h) / (h * complement))
-            return np.asarray(value - owens_t(k, (h - correlation * k) / (k * complement)))
+            both -= owens_t(h, (k - correlation[inner] * h) / (h * complement[inner]))
+            both -= owens_t(k, (h - correlation[inner] * k) / (k * complement[inner]))
+        value[inner] = both
+        return np.asarray(value)
 
     scores = (np.clip(end / sd, -MAX_SCORE, MAX_SCORE) for end in (low, high))
     (a, b), (c, d) = (np.where(score == 0, 1e-99, score).T for score in scores)

@@ -32,7 +32,7 @@ MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 """Number of stresses from which compiling their derivatives takes less time, and of those that are computed at once."""
 REAL_STEPS = (1e-5, 1e-6, 1e-7)
 """Steps of the stretch for difference quotients: shorter ones where an energy bends more, and rounding matters less."""
-AGREEMENT = 1e-6
+AGREEMENT = 1e-5
 """Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""
 
 

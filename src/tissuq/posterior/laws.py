@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,6 +18,7 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.drawing.panels import panels
 from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.headed_tables import in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.options import PythonOptions
@@ -27,15 +29,16 @@ from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
 from tissuq.pictures.rows import intervals
 from tissuq.posterior.fitting import OPTIONS, fit
+from tissuq.posterior.least_squares import LeastSquares, least_squares
 from tissuq.posterior.plots import ROW
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import predict_band, predict_bands
+from tissuq.prediction.bands import predict_bands
 from tissuq.prediction.densities import leave_one_out
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["ALL_LAWS", "LawComparison", "fit_laws", "laws_named"]
+__all__ = ["ALL_LAWS", "LawComparison", "LawFit", "fit_laws", "laws_named"]
 
 FloatArray = NDArray[np.float64]
 
@@ -50,25 +53,68 @@ NEGLIGIBLE_PROBABILITY = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
+class LawFit:
+    """One law fitted to the tests, and what is said of it.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Of the law with the discrepancy.
+    alone : LeastSquares or None
+        How near the law comes to the measurements by itself; None where it has no stress at some of them.
+    modulus : Marginal
+        Of the law's initial shear modulus, MPa.
+    row : mapping of str to number
+        Of the law in the table of all.
+    left_out : (n,) array
+        Log densities of new measurements, each left out in turn.
+    """
+
+    posterior: Posterior
+    alone: LeastSquares | None
+    modulus: Marginal
+    row: Mapping[str, Any]
+    left_out: FloatArray
+
+    @classmethod
+    def of(cls, data: Experiment, law: Material, priors: Mapping[str, Any], options: Mapping[str, Any]) -> LawFit:
+        """Fit a law to tests."""
+        start = perf_counter()
+        fitted = fit(data, material=law, priors=priors, **options)
+        posterior = replace(fitted, solution=copy(fitted.solution))  # without what it was computed from
+        seconds, alone = perf_counter() - start, None
+        with suppress(ModelError):
+            alone = least_squares(data, law, posterior.model.priors)
+        left_out = leave_one_out(posterior.solution).log_density
+        modulus = posterior.initial_shear_modulus
+        row = _row(posterior, modulus, alone) | {"seconds": seconds}
+        return cls(posterior, alone, modulus, row, left_out)
+
+
+@dataclass(frozen=True, eq=False)
 class LawComparison:
     """Fits of several laws to the same tests.
 
     Attributes
     ----------
-    fits : mapping of str to Posterior
+    laws : mapping of str to LawFit
         By the name of the law.
-    alone : mapping of str to Posterior
-        The laws without discrepancy, as tested: how near each comes to the measurements by itself.
-    seconds : mapping of str to float
-        How long each took.
     skipped : mapping of str to str
         Laws that could not be fitted, and why.
     """
 
-    fits: Mapping[str, Posterior]
-    alone: Mapping[str, Posterior]
-    seconds: Mapping[str, float]
+    laws: Mapping[str, LawFit]
     skipped: Mapping[str, str]
+
+    @property
+    def fits(self) -> dict[str, Posterior]:
+        """The posterior of every law, with the discrepancy."""
+        return {name: law.posterior for name, law in self.laws.items()}
+
+    @property
+    def alone(self) -> dict[str, LeastSquares]:
+        """How near each law comes to the measurements by itself, of those that have a stress at all of them."""
+        return {name: law.alone for name, law in self.laws.items() if law.alone is not None}
 
     @property
     def table(self) -> pd.DataFrame:
@@ -78,8 +124,8 @@ class LawComparison:
         - log_evidence, log_evidence_error; probability of the law, were all as probable before the data.
         - elpd: expected log density of new measurements, each left out in turn; elpd_difference: by how much it falls
           short of the best, and the standard error of that.
-        - r_squared, nrmse: of the law fitted alone, its median against the measurements; the root mean square error is
-          over the root mean square of the measured stress. Missing where it cannot be fitted.
+        - r_squared, nrmse: of the law by itself, fitted by least squares; the root mean square error is over the root
+          mean square of the measured stress. Missing where it has no stress at some measurement.
         - discrepancy_share, _low, _high: the part of the stress that the discrepancy carries: mean and 95 % interval.
         - stable, stable_beyond: probability of stability over the range of the invariants that was measured, and up to
           1.5 times these; in the least stable loading mode. Missing where the energy does not tell.
@@ -110,10 +156,9 @@ class LawComparison:
         """The laws side by side, moduli in MPa."""
         import pandas as pd
 
-        rows = [self._row(name, posterior) for name, posterior in self.fits.items()]
-        table = pd.DataFrame(rows, list(self.fits))
-        table.insert(3, "probability", [self.probabilities[name] for name in self.fits])
-        densities = [leave_one_out(posterior.solution).log_density for posterior in self.fits.values()]
+        table = pd.DataFrame([law.row for law in self.laws.values()], list(self.laws))
+        table.insert(3, "probability", [self.probabilities[name] for name in self.laws])
+        densities = [law.left_out for law in self.laws.values()]
         best = max(densities, key=np.sum)
         differences = [density - best for density in densities]
         table.insert(4, "elpd", [float(density.sum()) for density in densities])
@@ -205,36 +250,16 @@ class LawComparison:
         """The laws, the most probable first."""
         return sorted(self.fits, key=lambda name: -self.probabilities[name])
 
-    @cached_property
+    @property
     def _moduli(self) -> Mapping[str, Marginal]:
         """The initial shear modulus of each law, MPa."""
-        return {name: posterior.initial_shear_modulus for name, posterior in self.fits.items()}
+        return {name: law.modulus for name, law in self.laws.items()}
 
     @property
     def _likely(self) -> Mapping[str, float]:
         """The laws that are probable at all, with weights that sum to one."""
         likely = {name: p for name, p in self.probabilities.items() if p > NEGLIGIBLE_PROBABILITY}
         return {name: p / sum(likely.values()) for name, p in likely.items()}
-
-    def _row(self, name: str, posterior: Posterior) -> dict[str, Any]:
-        share, _ = shares_of_discrepancy(posterior.solution)
-        stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
-        ranges_beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
-        modulus = self._moduli[name]
-        r_squared, nrmse = _quality(self.alone[name]) if name in self.alone else (np.nan, np.nan)
-        return {
-            "parameters": len(posterior.model.material.parameters),
-            "log_evidence": np.nan if posterior.log_evidence is None else posterior.log_evidence,
-            "log_evidence_error": posterior.log_evidence_error or np.nan,
-            "r_squared": r_squared,
-            "nrmse": nrmse,
-            **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),
-            "stable": min(stable, default=np.nan),
-            "stable_beyond": min((of_mode.probability for of_mode in ranges_beyond), default=np.nan),
-            "modulus": float(modulus.quantile(0.5)),
-            **dict(zip(("modulus_low", "modulus_high"), modulus.hdi(), strict=True)),
-            "seconds": self.seconds[name],
-        }
 
 
 def fit_laws(
@@ -243,6 +268,7 @@ def fit_laws(
     *,
     priors: Mapping[str, Any] | None = None,
     step: Callable[[str], None] = lambda name: None,
+    pool: Executor | None = None,
     **options: Any,
 ) -> LawComparison:
     """Fit several laws to the same tests, with the same discrepancy and noise.
@@ -256,7 +282,10 @@ def fit_laws(
     priors : mapping of str to Prior, optional
         By parameter; a law takes those of its own.
     step : callable
-        Is told the name of each law before it is fitted.
+        Is told the name of each law before it is fitted, or waited for.
+    pool : Executor, optional
+        Processes among which the laws are divided, such as ``concurrent.futures.ProcessPoolExecutor(2)``; laws and
+        options must then be such as can be sent to them.
     options
         As of `tissuq.fit`.
 
@@ -288,23 +317,19 @@ def fit_laws(
     reading = {name: options.pop(name) for name in [*options] if name in PythonOptions.__annotations__}
     data = measurements(experiment, OPTIONS, **cast(PythonOptions, reading))
     candidates, is_all = laws_named(laws), laws == ALL_LAWS
-    fits, alone, seconds = dict[str, Posterior](), dict[str, Posterior](), dict[str, float]()
-    skipped, symbols = dict[str, str](), {p.symbol for law in candidates.values() for p in law.parameters}
+    symbols, skipped = {p.symbol for law in candidates.values() for p in law.parameters}, dict[str, str]()
+    tasks = dict[str, Callable[[], LawFit]]()
     for name, law in candidates.items():
-        step(name)
-        start = perf_counter()
         foreign_symbols = symbols - {parameter.symbol for parameter in law.parameters}
         chosen_priors = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in foreign_symbols}
+        tasks[name] = partial(LawFit.of, data, law, chosen_priors, options)
+    if pool is not None:  # the laws of most parameters, which take longest, begin
+        tasks |= {name: pool.submit(tasks[name]).result for name in reversed(tasks)}
+    fits = dict[str, LawFit]()
+    for name, task in tasks.items():
+        step(name)
         try:
-            posterior = fit(data, material=law, priors=chosen_priors, **options)
-            fits[name] = replace(posterior, solution=copy(posterior.solution))  # without what it was computed from
-            seconds[name] = perf_counter() - start
-            material_priors = {
-                symbol: prior for symbol, prior in chosen_priors.items() if symbol in fits[name].model.material_symbols
-            }
-            without = options | {"discrepancy": "none", "tolerances": "as-tested"}
-            with suppress(ConvergenceError, ModelError):
-                alone[name] = fit(data, material=law, priors=material_priors, **without)
+            fits[name] = task()
         except (ConvergenceError, ModelError, InputError) as error:
             if not is_all or (not fits and isinstance(error, InputError)):
                 raise
@@ -312,7 +337,26 @@ def fit_laws(
     if not fits:
         name, reason = next(iter(skipped.items()))
         raise ModelError(f"no law can be fitted, not even '{name}': {reason}")
-    return LawComparison(fits, alone, seconds, skipped)
+    return LawComparison(fits, skipped)
+
+
+def _row(posterior: Posterior, modulus: Marginal, alone: LeastSquares | None) -> dict[str, Any]:
+    """Return what a table says of a law, moduli in MPa."""
+    share, _ = shares_of_discrepancy(posterior.solution)
+    stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
+    ranges_beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
+    return {
+        "parameters": len(posterior.model.material.parameters),
+        "log_evidence": np.nan if posterior.log_evidence is None else posterior.log_evidence,
+        "log_evidence_error": posterior.log_evidence_error or np.nan,
+        "r_squared": np.nan if alone is None else alone.r_squared,
+        "nrmse": np.nan if alone is None else alone.nrmse,
+        **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),
+        "stable": min(stable, default=np.nan),
+        "stable_beyond": min((of_mode.probability for of_mode in ranges_beyond), default=np.nan),
+        "modulus": float(modulus.quantile(0.5)),
+        **dict(zip(("modulus_low", "modulus_high"), modulus.hdi(), strict=True)),
+    }
 
 
 def _percent(share: float) -> str:
@@ -335,15 +379,3 @@ def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:
     if len(by_name) < len(named_laws):
         raise InputError("a law is named twice: name each of the laws once.")
     return by_name
-
-
-def _quality(posterior: Posterior) -> tuple[float, float]:
-    """Return R^2 and the normalised root mean square error of a fit's median."""
-    measured, predicted = [], []
-    for curve in posterior.model.experiment.curves:
-        options: dict[str, Any] = {"noise": False, "mode": curve.mode, "channel": curve.channel}
-        measured.append(curve.stress)
-        predicted.append(predict_band(posterior.solution, curve.points, **options).median)
-    stress, residual = np.concatenate(measured), np.concatenate(measured) - np.concatenate(predicted)
-    total = ((stress - stress.mean()) ** 2).sum()
-    return float(1 - (residual**2).sum() / total), float(np.sqrt((residual**2).mean() / (stress**2).mean()))

@@ -10,7 +10,6 @@ from tissuq.drawing import pieces
 from tissuq.drawing.panels import columns_of, legend_above, on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
 from tissuq.pictures.curves import points_along, ways_of
-from tissuq.prediction.bands import predict_band
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
@@ -36,8 +35,8 @@ HOW_TO_READ = (
     "parameters pays for those that the data do not need. It says nothing about whether a law is true.",
     "elpd less best: by how much the expected log density of new measurements (each left out in turn) falls short of "
     "the best, with its standard error. Less than two errors is no difference.",
-    "R2 and error alone: of the law fitted without discrepancy; the error is the root mean square over that of the "
-    "stress. Share of discrepancy: of the stress beside this law, on average.",
+    "R2 and error alone: of the law by itself, fitted by least squares; the error is the root mean square over that "
+    "of the stress. Share of discrepancy: of the stress beside this law, on average.",
     "Stable / to 1.5 I: probability of stability over the range of I1 and I2 that was measured, and up to 1.5 times "
     "these, with the discrepancy where it is an energy; in the least stable loading mode.",
     "To continue with one law: tissuq predict, export or design with this folder and --material LAW.",
@@ -185,11 +184,11 @@ def curve_figure(study: LawStudy) -> Figure:
         for axis, curve in zip(axes, curves, strict=True):
             pieces.points(axis, curve.abscissa, curve.stress / scale, color=BASE)
             points = points_along(curve, LINE_POINTS)
-            options: dict[str, Any] = {"noise": False, "mode": curve.mode, "channel": curve.channel}
+            states = curve.path.at(points)
             for number, name in enumerate(names):
-                band = predict_band(study.comparison.alone[name].solution, points, **options)
-                for indices, is_curve in ways_of(curve.mode, points, band.stretch):
-                    pieces.line(axis, band.stretch[indices], band.median[indices] / scale, color=SERIES[number],
+                stress = study.comparison.alone[name].stress(states)
+                for indices, is_curve in ways_of(curve.mode, points, states.abscissa):
+                    pieces.line(axis, states.abscissa[indices], stress[indices] / scale, color=SERIES[number],
                                 width=1.2, is_path=is_curve, label=name)  # fmt: skip
             axis.set_title(curve.name)
             axis.set_xlabel(curve.mode.controls[0].name)
@@ -201,7 +200,7 @@ def curve_figure(study: LawStudy) -> Figure:
 def _sections(study: LawStudy) -> tuple[Section, ...]:
     """Return what a page folds: the curves of the laws, how to read the table, how it was computed, the data."""
     comparison = study.comparison
-    caption = "The laws fitted alone, without discrepancy: medians of those that come nearest to the measurements."
+    caption = "The laws by themselves, without discrepancy: least squares, those that come nearest to the measurements."
     curves = Picture("curves", lambda: curve_figure(study), "Curves of the laws", caption, is_slim=True)
     return (
         Section("The laws alone", (curves,)),

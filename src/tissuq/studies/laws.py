@@ -16,6 +16,7 @@ from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, merged, most_severe_first
 from tissuq.studies.specimen import priors_in_mpa, warnings_of_files
 from tissuq.studies.specimen_settings import LawSettings
+from tissuq.studies.stream import open_pool
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
 
@@ -71,13 +72,15 @@ def run_laws(
     step: Callable[[str], None] = lambda text: None,
     own: Mapping[str, Material] | None = None,
     found: Sequence[Reading | None] = (),
+    workers: int = 1,
 ) -> LawStudy:
     """Read the file, or those of several tests, and fit every chosen law.
 
     What has been read of every test may be given as ``found``.
 
     Settings may come from a file, so that laws of the user's own which they name are not run; these are given as
-    ``own``, by the names in the settings.
+    ``own``, by the names in the settings. Laws are divided among processes on this machine, as many as ``workers``;
+    those of the user's own are not.
 
     Raises
     ------
@@ -88,16 +91,18 @@ def run_laws(
     experiment = Experiment.of([reading.experiment for reading in readings])
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
     laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
-    comparison = fit_laws(
-        experiment,
-        ALL_LAWS if is_all else list(laws.values()),
-        discrepancy=discrepancy,
-        noise=settings.noise_in(unit),
-        priors=priors_in_mpa(settings, laws.values(), experiment),
-        tolerances=settings.tolerances_in(unit),
-        method=settings.method,
-        stable_in=settings.stable_in,
-        seed=settings.seed,
-        step=step,
-    )
+    with open_pool(1 if own else min(workers, len(laws))) as pool:
+        comparison = fit_laws(
+            experiment,
+            ALL_LAWS if is_all else list(laws.values()),
+            discrepancy=discrepancy,
+            noise=settings.noise_in(unit),
+            priors=priors_in_mpa(settings, laws.values(), experiment),
+            tolerances=settings.tolerances_in(unit),
+            method=settings.method,
+            stable_in=settings.stable_in,
+            seed=settings.seed,
+            step=step,
+            pool=pool,
+        )
     return LawStudy(settings, experiment, comparison, warnings_of_files(readings))

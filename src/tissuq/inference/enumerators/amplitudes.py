@@ -256,7 +256,7 @@ class Weighing:
         strain, log_inside = np.zeros(len(first_index)), np.zeros(len(first_index))
         if self._is_pulled:
             mean, root = lattice.linear(self._index, second_index, first_index)
-            strain = self._priors.strain(mean, root)
+            strain = self._priors.strain(mean, root) if self._model.noise.parameters else strain
             mean, root, log_mass = self._priors.times(mean, root * noise_sd[:, None, None])
             log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
         grids_and_indices = ((lattice.ratios[0], first_index), (lattice.ratios[1], second_index))
