@@ -11,6 +11,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
+from tissuq.mechanics.material import materials
 from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, merged, most_severe_first
@@ -91,7 +92,8 @@ def run_laws(
     experiment = Experiment.of([reading.experiment for reading in readings])
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
     laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
-    with open_pool(1 if own else min(workers, len(laws))) as pool:
+    are_known = all(type(law) in materials().values() for law in laws.values())  # to processes that start
+    with open_pool(min(workers, len(laws)) if are_known else 1) as pool:
         comparison = fit_laws(
             experiment,
             ALL_LAWS if is_all else list(laws.values()),

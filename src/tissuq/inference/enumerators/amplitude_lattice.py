@@ -52,6 +52,8 @@ MARGINAL_POINTS, MARGINAL_NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
 PULLED_DIVISOR = 5
 """So many times fewer, where priors of linear parameters depend on the noise, too."""
+OUTER_BOUNDED_DIVISOR = 4
+"""So many times fewer masses within bounds are computed where the sum over other parameters has a larger error."""
 MAX_CHEAP_BOUNDS = 2
 """Linear parameters up to which the masses within bounds cost little."""
 TAILS_POWER = 0.25
@@ -110,7 +112,8 @@ class AmplitudeLattice:
         bounded_points = self.guide.accuracy.bounded_points
         with one_thread():
             if Outer(models[0]).symbols:
-                sums = (_EnergySums(model, *weighted_nodes(model, self.guide), bounded_points) for model in models)
+                few = bounded_points // OUTER_BOUNDED_DIVISOR
+                sums = (_EnergySums(model, *weighted_nodes(model, self.guide), few) for model in models)
                 return [energy_sums.solution(self.components, seed) for energy_sums in sums]
             nodes = single_nodes(models)
             sums = (
