@@ -29,11 +29,11 @@ __all__ = ["TruncatedMixture"]
 FloatArray = NDArray[np.float64]
 
 MIN_DRAWS = 4000
-"""Draws, at least, that represent what bounds cut, in predictions and in a posterior's draws."""
+"""Draws, at least, that represent what bounds cut, in predictions and a posterior's draws, unless fewer are wanted."""
 MAX_COMPONENTS = 200
 """Components, at most, whose marginals within several bounds are computed."""
-MIN_POINTS = 200_000
-"""Points, at least, that stand for all of them together where more bounds cut than can be integrated."""
+POINTS_PER_COMPONENT = 1000
+"""Points for each of so many components, that stand for all together where more bounds cut than can be integrated."""
 FEW_GAUSSIANS = 60
 """Up to which Gaussians that are nearly the same are not merged."""
 SAME_GAUSSIAN = 0.005
@@ -98,26 +98,30 @@ class TruncatedMixture:
 
     def components(self, count: int | None = None) -> GaussianMixture:
         """Return all, or at most so many that stand for all: Gaussians, and draws in the bounds from what these cut."""
-        are_cut = [self._drawn(gaussians) for gaussians in (*self.cut.values(), self.crossed) if len(gaussians)]
+        number = min(MIN_DRAWS, count or MIN_DRAWS)
+        are_cut = [self._drawn(gaussians, number) for gaussians in (*self.cut.values(), self.crossed) if len(gaussians)]
         return GaussianMixture.of_all([self.free, *are_cut], count)
 
-    def marginal(self, index: int) -> Marginal:
-        """Return the marginal of one linear parameter: in closed form where at most one bound cuts."""
+    def marginal(self, index: int, most: int = MAX_COMPONENTS) -> Marginal:
+        """Return the marginal of one linear parameter: in closed form where at most one bound cuts.
+
+        Elsewhere from so many components at ``most``.
+        """
         marginals = [(self.free.weights.sum(), self.free.marginal(index))] if self.free.weights.sum() > 0 else []
         for cut_index, gaussians in self.cut.items():
             if gaussians.weights.sum() >= NEGLIGIBLE_MASS * 100:
                 marginal = _marginal_of_cut(gaussians, index, cut_index, self._bounds(cut_index))
                 marginals.append((gaussians.weights.sum(), marginal))
         if len(self.crossed):
-            marginals += self._crossed_marginals(index)
+            marginals += self._crossed_marginals(index, most)
         return blended(marginals, self._bounds(index))
 
     def _bounds(self, index: int) -> tuple[float, float]:
         return float(self.box.lower[0, index]), float(self.box.upper[0, index])
 
-    def _crossed_marginals(self, index: int) -> list[tuple[float, Marginal]]:
+    def _crossed_marginals(self, index: int, most: int) -> list[tuple[float, Marginal]]:
         """Return marginals of what several bounds cut, with their weights: by which bounds these are."""
-        thinned, share = self.crossed.thinned(MAX_COMPONENTS), self.crossed.weights.sum()
+        thinned, share = self.crossed.thinned(most), self.crossed.weights.sum()
         active = self._boxes(thinned).beyond(thinned.mean, thinned.root) > TOUCHED_MASS
         active[:, index] = True
         marginals = []
@@ -125,7 +129,7 @@ class TruncatedMixture:
             gaussians = thinned[(active == pattern).all(axis=1)]
             order = np.array([index, *(k for k in np.flatnonzero(pattern) if k != index)])
             if len(order) > MAX_NESTED:
-                points = self._points(gaussians)
+                points = self._points(gaussians, max(64, POINTS_PER_COMPONENT * most // len(gaussians)))
                 marginal = marginal_of_points(points.mean[:, index], points.weights, self._bounds(index))
             else:
                 low, high = ((ends[0] - gaussians.mean)[:, order] for ends in (self.box.lower, self.box.upper))
@@ -137,18 +141,17 @@ class TruncatedMixture:
     def _boxes(self, gaussians: GaussianMixture) -> Boxes:
         return self.box.repeated(len(gaussians))
 
-    def _drawn(self, gaussians: GaussianMixture) -> GaussianMixture:
-        """Return draws within the bounds, as components without extent."""
-        thinned = gaussians.thinned(MIN_DRAWS)
+    def _drawn(self, gaussians: GaussianMixture, number: int) -> GaussianMixture:
+        """Return so many draws within the bounds, or more, as components without extent."""
+        thinned = gaussians.thinned(number)
         count, p = thinned.mean.shape
-        draws = -(-MIN_DRAWS // count)
+        draws = -(-number // count)
         uniforms = quasi_random(p, count * draws).reshape(count, draws, p)
         points = self._boxes(thinned).draws(thinned.mean, thinned.root, uniforms)
         return _of_points(thinned, gaussians.weights.sum() * np.ones(points.shape[:2]) / points.shape[1], points)
 
-    def _points(self, gaussians: GaussianMixture) -> GaussianMixture:
-        """Return weighted points within the bounds."""
-        number = max(64, MIN_POINTS // len(gaussians))
+    def _points(self, gaussians: GaussianMixture, number: int) -> GaussianMixture:
+        """Return weighted points within the bounds, so many for each Gaussian."""
         log_shares, points = self._boxes(gaussians).points(gaussians.mean, gaussians.root, number)
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         return _of_points(gaussians, shares / shares.sum(axis=1, keepdims=True), points)

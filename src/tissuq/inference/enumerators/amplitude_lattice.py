@@ -48,6 +48,8 @@ TOUCHED_MASS = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
 MAX_COMPONENTS = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
+MARGINAL_DIVISOR = 15
+"""So many times fewer components are taken for the marginals within several bounds."""
 MARGINAL_POINTS, MARGINAL_NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
 PULLED_DIVISOR = 5
@@ -202,7 +204,7 @@ class _EnergySums:
             "exact",
             self._reason(),
             partial(self._represented, 1.0, components),
-            Marginals.of(self.model, self._marginal),
+            Marginals.of(self.model, partial(self._marginal, max(1, components // MARGINAL_DIVISOR))),
             partial(self._represented, TAILS_POWER, components),
             seed,
             log_evidence=log_evidence,
@@ -266,9 +268,9 @@ class _EnergySums:
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
         return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components(few)
 
-    def _marginal(self, symbol: str) -> Marginal:
+    def _marginal(self, most: int, symbol: str) -> Marginal:
         if symbol in self.model.linear:
-            return self._truncated.marginal(self.model.linear.index(symbol))
+            return self._truncated.marginal(self.model.linear.index(symbol), most)
         if symbol == "noise_sd":
             return self._noise_marginal()
         values = self._settings(self._points, self._node)[:, self.model.nonlinear.index(symbol)]
