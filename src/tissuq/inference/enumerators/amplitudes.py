@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -111,7 +111,9 @@ class Weighing:
         log_weights: Sequence[FloatArray] | None = None,
     ) -> None:
         self._model, self._lattices, self._index, self._ratios = model, lattices, index, ratios
-        self._log_weights, self._least_log_weight = log_weights, -np.inf
+        self._least_log_weight = -np.inf
+        if log_weights is not None:
+            self.__dict__["_log_weights"] = log_weights
         self._ends, self._priors = _ends(model, ratios), LinearPriors(model)
         self._is_pulled = self._priors.is_gaussian
 
@@ -145,36 +147,49 @@ class Weighing:
 
     def _roughly(self) -> list[Points]:
         """Return the points that matter of every lattice, each at one noise."""
-        if not self._model.noise.parameters and not self._is_pulled:
-            return self._at_known_noise()
+        if not self._model.noise.parameters and not self._priors.is_gaussian:
+            return self._cut_at_known_noise() if self._is_pulled else self._at_known_noise()
         points_of_members = [self._best_noise(member) for member in range(len(self._lattices))]
         masses = _masses(points_of_members)
         least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT_LOG_DROP))
         return [points[mass >= least_mass] for points, mass in zip(points_of_members, masses, strict=True)]
 
+    @cached_property
+    def _log_weights(self) -> Sequence[FloatArray]:
+        """The log weights (G2, G1) on each lattice at the known noise."""
+        data_set = slice(self._index, self._index + 1)
+        return [known_log_weights(self._model, lattice, data_set)[:, :, 0] for lattice in self._lattices]
+
     def _at_known_noise(self) -> list[Points]:
         """Return the points that matter of every lattice at the known noise, of which only these are made."""
-        noise_sd, logs = float(self._model.noise.sd({}, 0.0)), self._log_weights
-        if logs is None:
-            data_set = slice(self._index, self._index + 1)
-            logs = [known_log_weights(self._model, lattice, data_set)[:, :, 0] for lattice in self._lattices]
-            self._log_weights = logs
-        top = max(log_weights.max() for log_weights in logs)
-        masses = [np.exp(log_weights - top) for log_weights in logs]
+        top = max(log_weights.max() for log_weights in self._log_weights)
+        masses = [np.exp(log_weights - top) for log_weights in self._log_weights]
         least_mass = max(
             _least_that_matters(np.concatenate([mass.ravel() for mass in masses])), np.exp(-IRRELEVANT_LOG_DROP)
         )
-        points_of_members = []
-        for member, (lattice, mass) in enumerate(zip(self._lattices, masses, strict=True)):
-            indices = np.nonzero(mass >= least_mass)
-            misfit = lattice.misfit[(*indices, self._index)]
-            amplitudes, nothing = np.zeros((len(misfit), len(self._model.energy_symbols))), np.zeros(len(misfit))
-            pairs = zip(lattice.ratios, indices[::-1], strict=True)
-            for amplitude, (grid, place) in zip(lattice.member.amplitude_indices, pairs, strict=False):
-                amplitudes[:, amplitude] = grid[place] * noise_sd
-            arrays = np.full(len(misfit), noise_sd), amplitudes, logs[member][indices], misfit, nothing, nothing
-            points_of_members.append(Points(np.full(len(misfit), member), indices[0], indices[1], *arrays))
-        return points_of_members
+        return [self._known(member, mass >= least_mass) for member, mass in enumerate(masses)]
+
+    def _cut_at_known_noise(self) -> list[Points]:
+        """Return the points that matter where bounds, which only take away, leave little; those of all lattices."""
+        matters = [log_weights >= self._least_log_weight for log_weights in self._log_weights]
+        points = Points.joined([self._known(member, mask) for member, mask in enumerate(matters)])
+        mean, root = linear_at(self._lattices, self._index, points)
+        ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
+        points = replace(points, log_inside=ceiling)
+        (mass,) = _masses([points])
+        return [points[mass >= max(_least_that_matters(mass), np.exp(-IRRELEVANT_LOG_DROP))]]
+
+    def _known(self, member: int, mask: NDArray[np.bool_]) -> Points:
+        """Return points of a lattice (G2, G1) at the known noise, as if the linear parameters had no priors."""
+        lattice, indices, noise_sd = self._lattices[member], np.nonzero(mask), float(self._model.noise.sd({}, 0.0))
+        misfit = lattice.misfit[(*indices, self._index)]
+        amplitudes, nothing = np.zeros((len(misfit), len(self._model.energy_symbols))), np.zeros(len(misfit))
+        pairs = zip(lattice.ratios, indices[::-1], strict=True)
+        for amplitude, (grid, place) in zip(lattice.member.amplitude_indices, pairs, strict=False):
+            amplitudes[:, amplitude] = grid[place] * noise_sd
+        noise, log_weight = np.full(len(misfit), noise_sd), self._log_weights[member][indices]
+        of_member = np.full(len(misfit), member)
+        return Points(of_member, indices[0], indices[1], noise, amplitudes, log_weight, misfit, nothing, nothing)
 
     def _are_cut(self, point_sets: Sequence[Points]) -> bool:
         """Return whether the bounds of linear parameters take away much; and learn below which weight nothing matters.
@@ -195,8 +210,6 @@ class Weighing:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
         lattice, noise = self._lattices[member], self._model.noise
         second_index, first_index = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
-        if self._log_weights is not None:
-            second_index, first_index = np.nonzero(self._log_weights[member] >= self._least_log_weight)
         misfit = lattice.misfit[second_index, first_index, self._index]
         if not noise.parameters:
             return self._weighed(
