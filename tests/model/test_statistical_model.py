@@ -241,20 +241,28 @@ def test_a_material_that_is_not_linear_in_its_parameters_is_refused():
 
 def test_an_energy_that_jax_cannot_differentiate_is_refused_in_words():
     class WithNumpy(tq.Material):
-        """W = C10 (exp(I1 - 3) - 1), written with the wrong library."""
+        """W = C10 / b (exp(b (I1 - 3)) - 1), written with the wrong library."""
 
         name = "with-numpy"
-        formula = "C10 (exp(I1 - 3) - 1)"
+        formula = "C10 / b (exp(b (I1 - 3)) - 1)"
         source = "this test"
-        parameters = (tq.Parameter("C10", "half the modulus", support=(0.0, float("inf"))),)
+        parameters = (
+            tq.Parameter("C10", "half the modulus", support=(0.0, float("inf"))),
+            tq.Parameter("b", "rate", "rate", (0.0, float("inf")), is_linear=False),
+        )
 
         def strain_energy(self, I1, I2, values):
-            return values[0] * (np.exp(I1 - 3) - 1)
+            return values[0] / values[1] * (np.exp(values[1] * (I1 - 3)) - 1)
 
-    stretch = np.linspace(0.7, 2.0, 20_000)
-    many = tq.Experiment(mode="uniaxial", stretch=stretch, stress=stretch - 1)
     with pytest.raises(tq.ModelError, match=r"jax\.numpy"):
-        tq.fit(many, material=WithNumpy(), discrepancy="none", noise_sd=0.1)
+        tq.fit(
+            DATA,
+            material=WithNumpy(),
+            discrepancy="none",
+            noise_sd=0.1,
+            method="joint",
+            priors={"b": tq.Uniform(0.1, 1)},
+        )
 
 
 def test_two_materials_of_one_name_are_refused():
