@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import csv
 import tomllib
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.studies import laws
 
 from .conftest import STRESS_KPA, STRETCH, tree
 
@@ -76,6 +80,27 @@ def test_a_comparison_is_repeated_from_its_recipe(cli, here, specimen):
     first, again = (rows_of(here / folder) for folder in ("first", "again"))
     for name, row in first.items():
         assert row | {"seconds": ""} == again[name] | {"seconds": ""}
+
+
+def test_laws_that_are_divided_among_processes_are_written_alike(cli, here, specimen):
+    for workers in (1, 2):
+        said = cli("fit", specimen, *TWO, *ALONE, "--no-figures", "--workers", workers, "--out", str(workers))
+        assert said.status == 0, said.err
+    one, two = (rows_of(here / folder) for folder in ("1", "2"))
+    assert [row | {"seconds": ""} for row in one.values()] == [row | {"seconds": ""} for row in two.values()]
+
+
+def test_a_process_that_is_ended_from_outside_is_one_message(cli, here, specimen, monkeypatch):
+    class Lost(Executor):
+        def submit(self, *_):
+            future = Future()
+            future.set_exception(BrokenProcessPool())
+            return future
+
+    monkeypatch.setattr(laws, "open_pool", lambda _: nullcontext(Lost()))
+    said = cli("fit", specimen, *TWO, *ALONE, "--workers", 2)
+    assert (said.status, "ended from outside" in said.err, "--workers 1" in said.err) == (2, True, True)
+    assert not (here / "runs" / "specimen").exists()
 
 
 def test_a_law_of_ones_own_takes_part(cli, here, specimen):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from filecmp import cmp
 from functools import partial
@@ -116,7 +115,7 @@ def _compare_laws(
 
     study = call.carried_out(
         target,
-        lambda step: run_laws(settings, call.beside, step, own, readings, call.how.workers or os.cpu_count() or 1),
+        lambda step: run_laws(settings, call.beside, step, own, readings, call.how.workers),
         partial(law_result, sources=sources),
     )
     _print_omissions(study)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from tissuq.assessment.measurements import measurement_warnings
+from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
@@ -20,6 +24,9 @@ from tissuq.studies.specimen_settings import LawSettings
 from tissuq.studies.stream import open_pool
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
+
+MIN_DIVIDED = 4
+"""Laws from which starting processes takes less time than it saves."""
 
 
 @dataclass(frozen=True)
@@ -73,15 +80,15 @@ def run_laws(
     step: Callable[[str], None] = lambda text: None,
     own: Mapping[str, Material] | None = None,
     found: Sequence[Reading | None] = (),
-    workers: int = 1,
+    workers: int | None = None,
 ) -> LawStudy:
     """Read the file, or those of several tests, and fit every chosen law.
 
     What has been read of every test may be given as ``found``.
 
     Settings may come from a file, so that laws of the user's own which they name are not run; these are given as
-    ``own``, by the names in the settings. Laws are divided among processes on this machine, as many as ``workers``;
-    those of the user's own are not.
+    ``own``, by the names in the settings. Laws are divided among processes on this machine: so many ``workers``, or one
+    for each core where there are several laws; those of the user's own are not.
 
     Raises
     ------
@@ -93,7 +100,9 @@ def run_laws(
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
     laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
     are_known = all(type(law) in materials().values() for law in laws.values())  # to processes that start
-    with open_pool(min(workers, len(laws)) if are_known else 1) as pool:
+    one_a_core = 1 if len(laws) < MIN_DIVIDED else os.cpu_count() or 1
+    processes = min(workers or one_a_core, len(laws)) if are_known else 1
+    with _loss_in_words(), open_pool(processes) as pool:
         comparison = fit_laws(
             experiment,
             ALL_LAWS if is_all else list(laws.values()),
@@ -108,3 +117,15 @@ def run_laws(
             pool=pool,
         )
     return LawStudy(settings, experiment, comparison, warnings_of_files(readings))
+
+
+@contextmanager
+def _loss_in_words() -> Iterator[None]:
+    """Say in words that a process was ended from outside."""
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise InputError(
+            "a process that fitted laws was ended from outside, perhaps for want of memory: use fewer of them "
+            "(--workers 1), or compare fewer laws (--material NAME, once for each)."
+        ) from error

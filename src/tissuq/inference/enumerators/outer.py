@@ -243,14 +243,14 @@ class _Search:
         """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
         places = guide.places
         if places is None:
-            scout = known_along(lambda some: self._scouted(some[:, None]), first_places(), MAX_SCORE)
+            scout = known_along(lambda at: self._scouted(at[:, None]), first_places(), MAX_SCORE)
             places = scout.spread(guide.accuracy)
         nodes: dict[float, Node] = {}
 
-        def log_density(some: FloatArray) -> FloatArray:
-            new = self._nodes(some[:, None])
-            nodes.update(zip(some.tolist(), new, strict=True))
-            return self._log_masses(new, some[:, None])
+        def log_density(at: FloatArray) -> FloatArray:
+            new = self._nodes(at[:, None])
+            nodes.update(zip(at.tolist(), new, strict=True))
+            return self._log_masses(new, at[:, None])
 
         self._leave_out_members(places[[len(places) // 2]])
         places = np.concatenate([places, self._peaks(guide)])
@@ -266,8 +266,8 @@ class _Search:
         model = self._sums.model
         freedom, noise = model.experiment.size - len(model.linear), model.noise
 
-        def log_likelihood(some: FloatArray) -> FloatArray:
-            settings, misfit = self._settings(some[:, None]), np.empty(len(some))
+        def log_likelihood(at: FloatArray) -> FloatArray:
+            settings, misfit = self._settings(at[:, None]), np.empty(len(at))
             for rows in self._outer.alike(settings, len(settings)):
                 misfit[rows] = (self._outer.rows(settings[rows]).fit.left ** 2).sum(axis=(1, 2))
             if noise.parameters:
