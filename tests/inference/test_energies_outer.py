@@ -8,7 +8,7 @@ from scipy.stats import halfcauchy
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.outer import relative_error
+from tissuq.inference.enumerators.outer_search import relative_error
 from tissuq.inference.linear import times_gaussians
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points
 from tissuq.model.noise import stress_level

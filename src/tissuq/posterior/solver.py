@@ -13,7 +13,7 @@ from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.line import ROUGH, Accuracy
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
-from tissuq.inference.enumerators.outer import Guide
+from tissuq.inference.enumerators.outer_search import Guide
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates

@@ -4,7 +4,7 @@ Given a member and the ratios g = c / noise_sd of its amplitudes, everything is 
 (`tissuq.inference.enumerators.lattice`). The integrand is smooth in log g and log noise_sd, so that equally spaced
 points integrate it with an error that falls exponentially with their number. A parameter that is left, such as an
 exponent, takes values spread over its posterior, and several those of weighted quasi-random points
-(`tissuq.inference.enumerators.outer`).
+(`tissuq.inference.enumerators.outer_search`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from tissuq.inference.enumerators.amplitudes import (
     noise_grid,
 )
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Reduced
-from tissuq.inference.enumerators.outer import OUTER_STEP, Guide, Node, Outer, single_nodes, weighted_nodes
+from tissuq.inference.enumerators.nodes import OUTER_STEP, Node, single_nodes
+from tissuq.inference.enumerators.outer import Outer
+from tissuq.inference.enumerators.outer_search import Guide, weighted_nodes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
@@ -280,7 +282,9 @@ class _EnergySums:
             first_of_node = np.flatnonzero(np.diff(self._node, prepend=-1))
             shares = np.add.reduceat(self._weights, first_of_node)
             if self._nodes[0].place is not None:
-                return self._outer.marginal([self._nodes[number] for number in self._node[first_of_node]], shares)
+                nodes = [self._nodes[number] for number in self._node[first_of_node]]
+                places, widths = np.array([(node.place, node.width) for node in nodes]).T
+                return self._outer.marginal(places, widths, shares)
             return marginal_of_points(values[first_of_node], shares, self.model.priors[symbol].support)
         return marginal_of_points(values, self._weights, self.model.priors[symbol].support)
 

@@ -1,0 +1,184 @@
+"""The search for values of the outer parameters: along a line for one, by an adapted proposal for more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ConvergenceError
+from tissuq.inference.enumerators.line import FINE, Accuracy, first_places, known_along, peaks
+from tissuq.inference.enumerators.nodes import Node, Sums
+from tissuq.inference.enumerators.outer import MAX_SCORE, TINY, Outer
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective
+from tissuq.model.statistical_model import StatisticalModel
+
+__all__ = ["Guide", "relative_error", "weighted_nodes"]
+
+FloatArray = NDArray[np.float64]
+
+VALUES_PER_PARAMETER = 64
+"""Values taken at first for each of the parameters, and once more."""
+SCOUT_MEMBERS = 6
+"""Members, about, whose posterior guides the search for the values."""
+GUIDED_DIVISOR = 8
+"""So many times fewer values in a round, where it is known from a similar model about where they lie."""
+NEGLIGIBLE_MEMBERS = 1e-3
+"""Share of the posterior, in its middle, of all members that are left out."""
+
+
+@dataclass
+class Guide:
+    """Where the posterior of the outer parameters was last: what the search in a similar model begins with.
+
+    A lower accuracy takes fewer values.
+    """
+
+    accuracy: Accuracy = FINE
+    places: FloatArray | None = None
+    peaks: FloatArray | None = None
+    proposal: Proposal | None = None
+
+
+def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
+    """Return nodes at values of the outer parameters, their log weights, and the relative error of their sum.
+
+    One parameter takes values spread along its posterior; more take quasi-random ones of an adapted proposal.
+
+    Raises
+    ------
+    ConvergenceError
+        When the posterior of these parameters is far outside their priors, or few of the values hold nearly all of it.
+    """
+    outer = Outer(model)
+    search = _Search(Sums(model, outer), outer, len(model.energy_members))
+    return search.on_line(guide) if len(outer.symbols) == 1 else search.by_proposal(guide)
+
+
+class _Search:
+    """The search for values of the outer parameters of one model."""
+
+    def __init__(self, sums: Sums, outer: Outer, member_count: int) -> None:
+        self._sums, self._outer, self._members = sums, outer, np.arange(member_count)
+
+    def on_line(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
+        """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
+        places = guide.places
+        if places is None:
+            scout = known_along(lambda at: self._scouted(at[:, None]), first_places(), MAX_SCORE)
+            places = scout.spread(guide.accuracy)
+        nodes: dict[float, Node] = {}
+
+        def log_density(at: FloatArray) -> FloatArray:
+            new = self._nodes(at[:, None])
+            nodes.update(zip(at.tolist(), new, strict=True))
+            return self._log_masses(new, at[:, None])
+
+        self._leave_out_members(places[[len(places) // 2]])
+        places = np.concatenate([places, self._peaks(guide)])
+        line = known_along(log_density, places, MAX_SCORE, guide.accuracy)
+        guide.places = line.spread(guide.accuracy)
+        self._check_place(line.places[[line.log_masses.argmax()]])
+        cells = zip(line.places, np.exp(line.log_masses - line.logs), strict=True)
+        line_nodes = [replace(nodes[float(place)], place=float(place), width=float(width)) for place, width in cells]
+        return *_weighted(line_nodes, line.log_masses), line.error
+
+    def _peaks(self, guide: Guide) -> FloatArray:
+        """Return places about where the material alone fits the data: a posterior may have a narrow peak there."""
+        model = self._sums.model
+        freedom, noise = model.experiment.size - len(model.linear), model.noise
+
+        def log_likelihood(at: FloatArray) -> FloatArray:
+            settings, misfit = self._settings(at[:, None]), np.empty(len(at))
+            for rows in self._outer.alike(settings, len(settings)):
+                misfit[rows] = (self._outer.rows(settings[rows]).fit.left ** 2).sum(axis=(1, 2))
+            if noise.parameters:
+                return np.asarray(-0.5 * freedom * np.log(np.maximum(misfit, TINY)))
+            return np.asarray(-0.5 * misfit / float(noise.sd({}, 0.0)) ** 2)
+
+        if guide.peaks is None:
+            guide.peaks = peaks(log_likelihood, MAX_SCORE / 2)
+        return guide.peaks
+
+    def by_proposal(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
+        """Return nodes at points that a proposal gives, adapted until enough of them are effective."""
+        d = len(self._outer.symbols)
+        start = guide.proposal
+        if start is None:
+            start = adapted(self._scouted, d).proposal
+        self._check_place(start.mean)
+        self._leave_out_members(start.mean)
+        nodes = list[Node]()
+
+        def log_masses(points: FloatArray) -> FloatArray:
+            new = self._nodes(points)
+            nodes.extend(new)
+            return self._log_masses(new, points)
+
+        count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
+        min_effective = guide.accuracy.min_effective
+        adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
+        guide.proposal = adaptation.proposal
+        error = relative_error(self._outer, adaptation.log_weights, min_effective)
+        return *_weighted(nodes, adaptation.log_weights - np.log(len(nodes))), error
+
+    def _scouted(self, points: FloatArray) -> FloatArray:
+        """Return the logarithms of the density at points (N, d), roughly: from a few of the members."""
+        scouts = self._members[:: -(-len(self._members) // SCOUT_MEMBERS)]
+        sums = self._sums.points(self._settings(points), scouts)
+        return np.asarray(self._bases(points) + [np.logaddexp.reduce(of_point.log_weight) for of_point in sums])
+
+    def _nodes(self, points: FloatArray) -> list[Node]:
+        return self._sums.nodes(self._settings(points), self._members)
+
+    def _log_masses(self, nodes: Sequence[Node], points: FloatArray) -> FloatArray:
+        """Return the logarithms of the density at points (N, d), given the nodes there."""
+        return np.asarray(self._bases(points) + [node.log_mass for node in nodes])
+
+    def _settings(self, points: FloatArray) -> FloatArray:
+        return np.array([self._outer.settings(point) for point in points])
+
+    def _bases(self, points: FloatArray) -> FloatArray:
+        return np.array([self._outer.log_base(point) for point in points])
+
+    def _leave_out_members(self, point: FloatArray) -> None:
+        """Leave out members that have next to no mass at a point (d,) in the middle of the posterior."""
+        (points,) = self._sums.points(self._settings(point[None]), self._members)
+        masses = np.bincount(points.lattice, np.exp(points.log_weight - points.log_weight.max()), len(self._members))
+        order = np.argsort(masses)
+        self._members = np.sort(order[np.cumsum(masses[order]) > NEGLIGIBLE_MEMBERS * masses.sum()])
+
+    def _check_place(self, point: FloatArray) -> None:
+        far = [s for s, score in zip(self._outer.symbols, np.abs(point), strict=True) if score > MAX_SCORE - 1]
+        if far:
+            raise ConvergenceError(
+                f"the data put {', '.join(far)} where the prior leaves next to nothing (less than 1e-12): give a prior "
+                "that holds what the data say, in MPa where it is a stress."
+            )
+
+
+def relative_error(outer: Outer, log_masses: FloatArray, min_effective: float) -> float:
+    """Return the relative error of a sum of independent masses, given their logarithms (K,).
+
+    Raises
+    ------
+    ConvergenceError
+        When few of them hold nearly everything.
+    """
+    count = effective(log_masses)
+    if count < min_effective:
+        raise ConvergenceError(
+            f"the posterior of {', '.join(outer.symbols)} was not found well enough to integrate the discrepancy: "
+            f"{count:.0f} of {len(log_masses)} values are effective. Give these parameters narrower priors, or choose "
+            "a material with fewer of them."
+        )
+    return float(np.sqrt(1 / count - 1 / len(log_masses)))
+
+
+def _weighted(nodes: Sequence[Node], log_masses: FloatArray) -> tuple[list[Node], FloatArray]:
+    """Return nodes with a mass at all, and log weights that give them these masses (K,)."""
+    node_masses = np.array([node.log_mass for node in nodes])
+    numbers = np.flatnonzero(np.isfinite(node_masses))
+    return [nodes[int(number)] for number in numbers], (log_masses - node_masses)[numbers]
