@@ -199,7 +199,7 @@ def test_auto_is_the_mixture_of_its_sums():
 def test_a_lattice_that_ends_too_soon_is_made_again(monkeypatch, largest):
     data = measured(seed=4)
     evidence, whole = (fitted := tq.fit(data, discrepancy="taylor", noise_sd=NOISE_SD)).log_evidence, fitted.summary()
-    monkeypatch.setattr("tissuq.inference.enumerators.outer.MAX_RATIO_TO_DATA", largest)
+    monkeypatch.setattr("tissuq.inference.enumerators.nodes.MAX_RATIO_TO_DATA", largest)
     again = tq.fit(data, discrepancy="taylor", noise_sd=NOISE_SD)
     assert again.log_evidence == pytest.approx(evidence, abs=1e-6)
     np.testing.assert_allclose(again.summary().loc["C10"], whole.loc["C10"], rtol=1e-6)
