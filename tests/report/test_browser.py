@@ -185,6 +185,21 @@ def test_the_page_of_any_command_has_verdicts_before_the_picture_on_a_small_scre
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
+def test_the_names_of_rows_stay_in_view_where_a_table_is_moved(tmp_path):
+    rows = [[name, *["0.123 ± 0.001"] * 6] for name in ("neo-hookean", "veronda-westmann")]
+    table = Table(["law", *"abcdef"], rows, "Laws")
+    sections = (Section("Laws", (table,)),)
+    write_result(Result(command="fit", title="Which law", subject="a test", sections=sections), tmp_path)
+    for width, is_moved in ((1200, False), (400, True)):
+        with opened(tmp_path / "report.html", width) as page:
+            page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+            cells = page.locator("td", has_text="veronda-westmann"), page.locator("tr:last-child td").nth(1)
+            before = [cell.bounding_box()["x"] for cell in cells]
+            page.locator(".scroll:has(> table)").evaluate("part => { part.scrollLeft = 90; }")
+            after = [cell.bounding_box()["x"] for cell in cells]
+            assert after == [before[0], before[1] - 90 * is_moved]
+
+
 def test_axe_finds_a_fault_that_is_planted(of_one_test):
     with opened(of_one_test, bypass_csp=True) as page:
         page.evaluate("document.querySelector('img').removeAttribute('alt')")
