@@ -20,7 +20,7 @@ from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.export import CardSettings, card_format
+from tissuq.export import Cards, CardSettings, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
 
 __all__ = ["DeckForward"]
@@ -29,6 +29,8 @@ FloatArray = NDArray[np.float64]
 
 SOLVED = "solver"
 """Folder with a folder for each run of the solver."""
+ALLOWED_VALUE = 0.1
+"""A value that every parameter of a law with fibres may have: stress, rate, dispersion, and angle in radians."""
 PLACES = 16
 """Digits of a digest that name the folder of a run."""
 
@@ -52,7 +54,8 @@ class DeckForward(Forward):
         What was measured, such as ``RF2@PUNCH`` (`tissuq.decks.parse_quantity`); of several quantities each by its
         name in the mappings that `tissuq.calibrate` gets.
     stretch : (float, float)
-        Smallest and largest stretch in the model, over which the law's card is to hold where it is a projection.
+        Smallest and largest stretch in the model, over which the law's card is to hold where it is a projection; of a
+        law with fibres along both axes of a sheet.
     along : str, optional
         What the controls are, such as ``U2@PUNCH``; the time of the model, unless given.
     factor, along_factor : float
@@ -164,9 +167,9 @@ class DeckForward(Forward):
                 f"the material {self.law.name} in the model has the parameters {', '.join(wanted)}; those with priors "
                 f"are {', '.join(symbols)}."
             )
+        name = self.read_deck.material(self.replaced).name
         if not self.law.is_isotropic:
-            raise InputError(f"material '{self.law.name}' has fibres, and decks are calibrated with isotropic ones.")
-        self.read_deck.material(self.replaced)
+            check_fibres(name, self._cards(dict.fromkeys(wanted, ALLOWED_VALUE)))
         self.program.check_installed()
         extra_files(self.read_deck, self.also, Path())
         for quantity in self.quantities:
@@ -214,16 +217,20 @@ class DeckForward(Forward):
         return self.folder / SOLVED / f"run-{digest[:PLACES]}"
 
     def _block(self, parameters: Mapping[str, float]) -> str:
+        """Return the material with parameters in the unit of the model, as the deck has it."""
+        return self._cards(parameters).blocks[0]
+
+    def _cards(self, parameters: Mapping[str, float]) -> Cards:
         """Return the card of the material with parameters in the unit of the model."""
         law, number = self.law, self.read_deck.material(self.replaced).number
         in_mpa = {p.symbol: parameters[p.symbol] / (self.cards.factor if p.unit else 1.0) for p in law.parameters}
         drawn = card_material(law, tuple(in_mpa.values()), self.stretch, self.mode)
         name = self.card_format or self.program.card_format or self.read_deck.format.card_format
         settings = replace(self.cards, number=int(number) if number.isdecimal() else 1)
-        blocks = card_format(name).cards(drawn, settings).blocks
-        if not blocks:
+        cards = card_format(name).cards(drawn, settings)
+        if not cards.blocks:
             raise UnreadableError(f"cards of the format '{name}' do not go into a deck.")
-        return blocks[0]
+        return cards
 
     def _at(self, control: FloatArray, name: str, curves: Mapping[str, Any], problem: str) -> FloatArray:
         """Return a quantity at its controls."""

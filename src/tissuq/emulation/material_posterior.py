@@ -124,7 +124,11 @@ def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float
 def _experiment(
     law: Material, values: NDArray[np.float64], loading: LoadingMode, stretch: tuple[float, float]
 ) -> Experiment:
-    """Return the mean stress of parameters (N, k) at points of a range, which stand for what was measured."""
+    """Return the mean stress of parameters (N, k) at points of a range, which stand for what was measured.
+
+    Of a law with fibres these are both stresses of a sheet that is stretched along one axis, the other, and both: most
+    modes do not say how it deforms.
+    """
     if len(loading.controls) != 1:
         raise InputError(f"the mode '{loading.name}' has several controls: give the range in one with one control.")
     low, high = map(float, stretch)
@@ -132,7 +136,11 @@ def _experiment(
         raise InputError(f"the range of the stretch must be two rising positive numbers, not {low:g}:{high:g}.")
     points = np.linspace(low, high, POINTS)
     points = points[np.abs(points - 1) > 1e-9]
-    return Experiment(loading, points, engineering_stress(law, loading.paths[0], points, values).mean(axis=0))
+    if not law.is_isotropic:
+        loading, still = loading_mode("biaxial"), np.ones_like(points)
+        points = np.vstack([np.column_stack(axes) for axes in ((points, still), (still, points), (points, points))])
+    stresses = [engineering_stress(law, path, points, values).mean(axis=0) for path in loading.paths]
+    return Experiment(loading, points, np.column_stack(stresses) if len(stresses) > 1 else stresses[0])
 
 
 def check_material(

@@ -2,12 +2,11 @@
 
 from tissuq.export.cards import CardFormat, Cards, CardSettings, card_format, card_formats
 from tissuq.export.code import Card, FECode
-from tissuq.export.fibres import CALCULIX_PREFIX
+from tissuq.export.fibres import check_fibres
 from tissuq.export.formats import Abaqus, Ansys, CalculiX, FEBio, LSDyna
 from tissuq.export.table import Table
 
 __all__ = [
-    "CALCULIX_PREFIX",
     "Abaqus",
     "Ansys",
     "CalculiX",
@@ -21,4 +20,5 @@ __all__ = [
     "Table",
     "card_format",
     "card_formats",
+    "check_fibres",
 ]

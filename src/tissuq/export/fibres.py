@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, degrees, pi, sin
 
+from tissuq.errors import InputError
+from tissuq.export.cards import Cards
 from tissuq.export.laws import Constants, Form
 from tissuq.mechanics import FibreMaterial, Material
 from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, MaterialSum, Rivlin, StandardFibres
@@ -15,6 +17,7 @@ __all__ = [
     "FIBRE_AXES",
     "QUADRATIC_RATE",
     "FibreForm",
+    "check_fibres",
     "directions",
     "fibre_sentences",
     "initial_stiffness",
@@ -95,6 +98,24 @@ def initial_stiffness(form: Form, constants: Constants) -> float:
     Added to the matrix's shear modulus it is the one on whose scale the bulk modulus is large.
     """
     return 4 / 3 * constants["k1"] / form.share * form.families if isinstance(form, FibreForm) else 0.0
+
+
+def check_fibres(name: str, cards: Cards) -> None:
+    """Refuse cards whose fibres a model would not compute as they are meant, in the place of a material of that name.
+
+    Raises
+    ------
+    InputError
+        When the cards do not hold all of the fibres, or CalculiX would not take the material for one with fibres.
+    """
+    if cards.outside:
+        raise InputError(cards.outside)
+    if f"NAME={CALCULIX_PREFIX}" in cards.blocks[0] and not name.upper().startswith(CALCULIX_PREFIX):
+        raise InputError(
+            f"CalculiX knows a material with fibres by its name, which begins with {CALCULIX_PREFIX}: in the model, "
+            f"rename '{name}' to '{CALCULIX_PREFIX}_{name}', in *MATERIAL and wherever else it is named, such as "
+            f"*SOLID SECTION, and give --replace {CALCULIX_PREFIX}_{name}."
+        )
 
 
 def fibre_sentences(form: Form, constants: Sequence[Constants]) -> Iterator[str]:

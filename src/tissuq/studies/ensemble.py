@@ -14,13 +14,12 @@ if TYPE_CHECKING:
     from tissuq.posterior.ensemble import Sampling
 
 from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
-from tissuq.decks.deck import DeckMaterial
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
 from tissuq.decks.model_files import MODEL, extra_files
 from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, sets_of
 from tissuq.decks.quantity import located
 from tissuq.errors import InputError
-from tissuq.export import CALCULIX_PREFIX, Cards, card_format
+from tissuq.export import Cards, card_format, check_fibres
 from tissuq.finite_elements.simulation import COMPLETE, FINE_MESH, MATERIAL_ONLY
 from tissuq.mechanics import Material
 from tissuq.posterior.ensemble import Ensemble
@@ -170,7 +169,7 @@ def prepare_ensemble(
         cards[COMPLETE][name] = formatting.cards(ensemble, card_settings)
         if not cards[COMPLETE][name].blocks:
             raise InputError(f"cards of the format '{settings.card_format}' do not go into a deck.")
-        _check_fibres(replaced[name], cards[COMPLETE][name])
+        check_fibres(replaced[name].name, cards[COMPLETE][name])
         if is_shared:
             cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
     _check_names(quantities, ensembles)
@@ -182,19 +181,6 @@ def prepare_ensemble(
     for quantity in quantities if not is_dry else ():
         quantity.check()
     return prepared
-
-
-def _check_fibres(material: DeckMaterial, cards: Cards) -> None:
-    """Refuse fibres that a deck would not compute as they are meant."""
-    if cards.outside:
-        raise InputError(cards.outside)
-    is_named = material.name.upper().startswith(CALCULIX_PREFIX)
-    if f"NAME={CALCULIX_PREFIX}" in cards.blocks[0] and not is_named:
-        raise InputError(
-            f"CalculiX knows a material with fibres by its name, which begins with {CALCULIX_PREFIX}: in the model, "
-            f"rename '{material.name}' to '{CALCULIX_PREFIX}_{material.name}', in *MATERIAL and wherever else it is "
-            f"named, such as *SOLID SECTION, and give --replace {CALCULIX_PREFIX}_{material.name}."
-        )
 
 
 def drawn_materials(
