@@ -50,11 +50,11 @@ def written(folder, deck=ALONG_LOAD):
     return measured
 
 
-def words(material=MATERIAL, replaced="ELASTIC_FIBER_WALL"):
-    priors = [word for name, (low, high) in ENDS.items() for word in ("--prior", f"{name}=uniform({low},{high})")]
+def words(material=MATERIAL, replaced="ELASTIC_FIBER_WALL", ends=ENDS, stretch="0.9:1.25"):
+    priors = [word for name, (low, high) in ends.items() for word in ("--prior", f"{name}=uniform({low},{high})")]
     return [
         "calibrate", "pull.csv", "--model", "cube.inp", "--replace", replaced, "--material", material, "--range",
-        "0.9:1.25", "--qoi", "force=RF1@TIP", "--along", "elongation=U1@TIP", "--noise-sd", NOISE_SD, *priors,
+        stretch, "--qoi", "force=RF1@TIP", "--along", "elongation=U1@TIP", "--noise-sd", NOISE_SD, *priors,
         "--runs", 16, "--max-jobs", 1, "--no-figures", "--out", "out",
     ]  # fmt: skip
 
@@ -83,16 +83,19 @@ def test_fibres_of_a_deck_have_the_posterior_of_a_grid_and_go_on_to_cards(cli, h
 
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
 @pytest.mark.parametrize(
-    ("material", "name", "advice"),
+    ("matrix", "name", "stretch", "advice"),
     [
-        (MATERIAL, "Wall", "rename 'Wall' to 'ELASTIC_FIBER_Wall'"),
-        ("yeoh+standard-fibres@30", "ELASTIC_FIBER_WALL", "a neo-Hookean matrix with one kind of fibres"),
+        (["C10"], "Wall", "0.9:1.25", "rename 'Wall' to 'ELASTIC_FIBER_Wall'"),
+        (["C10", "C20", "C30"], "ELASTIC_FIBER_WALL", "0.9:1.25", "a neo-Hookean matrix with one kind of fibres"),
+        (["mu", "Jm"], "ELASTIC_FIBER_WALL", "0.7:1.25", "a neo-Hookean matrix with one kind of fibres"),
+        (["C10"], "ELASTIC_FIBER_WALL", "0.7:1", "goes beyond 1, not 0.7:1"),
     ],
 )
-def test_fibres_that_a_deck_cannot_have_are_refused_before_anything_is_run(cli, here, material, name, advice):
+def test_fibres_that_a_deck_cannot_have_are_refused_before_anything_is_run(cli, here, matrix, name, stretch, advice):
     written(here, ALONG_LOAD.replace("ELASTIC_FIBER_WALL", name))
-    priors = ["--prior", "C20=uniform(0,1)", "--prior", "C30=uniform(0,1)"] if "yeoh" in material else []
-    said = cli(*words(material, name), *priors)
+    laws = {"C10": "neo-hookean", "C10 C20 C30": "yeoh", "mu Jm": "gent"}
+    ends = dict.fromkeys([*matrix, "k"], (0.01, 1))
+    said = cli(*words(f"{laws[' '.join(matrix)]}+standard-fibres@30", name, ends, stretch))
     assert said.status == 2
     assert advice in " ".join(said.err.split())
     assert not (here / "out").exists()

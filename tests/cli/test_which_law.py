@@ -18,6 +18,19 @@ from .conftest import STRESS_KPA, STRETCH, tree
 
 ALONE = ["--discrepancy", "none", "--noise-sd", "1", "--estimand", "as-tested"]
 TWO = ["--material", "neo-hookean", "--material", "mooney-rivlin"]
+CLASS_LAW = """
+from tissuq import Material, Parameter
+
+
+class Own(Material):
+    name = "law-in-a-class-of-a-test"
+    formula = "C (I1 - 3)"
+    source = "this test"
+    parameters = (Parameter("C", "half the modulus"),)
+
+    def strain_energy(self, I1, I2, values):
+        return values[0] * (I1 - 3)
+"""
 LAW = """
 def softening(I1, I2, mu, k):
     return mu * (I1 - 3) / 2 - k * (I1 - 3) ** 2
@@ -118,6 +131,13 @@ def test_a_law_of_ones_own_takes_part(cli, here, specimen):
     two = ["--material", "neo-hookean", "--user-law", "law.py:softening"]
     refused = cli("predict", "runs/specimen", *two, *options, "p2")
     assert (refused.status, "give one law" in refused.err) == (2, True)
+
+
+def test_a_law_in_a_class_of_ones_own_is_fitted_where_it_is_known(cli, here, specimen):
+    (here / "law.py").write_text(CLASS_LAW)
+    said = cli("fit", specimen, "--material", "law.py:Own", *TWO, *ALONE, "--workers", 2, "--no-figures")
+    assert said.status == 0, said.err
+    assert len(rows_of(here / "runs" / "specimen")) == 3
 
 
 @pytest.mark.parametrize(

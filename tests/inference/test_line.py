@@ -104,3 +104,18 @@ def test_a_law_that_locks_is_fitted_where_the_data_do_not_show_it(material):
     assert modulus[1] < 0.02 < modulus[2]
     low, high = posterior.summary().loc["Jm", ["hdi_low", "hdi_high"]]
     assert high > 3 * low
+
+
+@pytest.mark.parametrize("noise_sd", [1e-3, None])
+def test_the_middle_of_a_prior_may_have_no_stress(noise_sd):
+    """Ogden's energy divides by its exponent."""
+    data = tq.simulate("ogden-1", {"mu1": 0.4, "alpha1": 3.0}, np.linspace(0.8, 1.4, 12), 1e-3, 1)
+    found = [
+        tq.fit(
+            data, material="ogden-1", discrepancy="taylor", noise_sd=noise_sd, priors={"alpha1": tq.Uniform(low, 10)}
+        )
+        for low in (-10, -10.01)
+    ]
+    assert found[0].log_evidence == pytest.approx(found[1].log_evidence, abs=0.01)
+    means = [posterior.summary().loc["alpha1", "mean"] for posterior in found]
+    assert means[0] == pytest.approx(means[1], rel=1e-3)

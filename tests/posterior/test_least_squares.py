@@ -71,3 +71,24 @@ def test_every_law_comes_as_near_as_from_a_thousand_random_parameters(law):
             inside = np.clip(np.linalg.lstsq(basis, STRESS, rcond=None)[0], *np.array(
                 [priors[p.symbol].support for p in material.parameters if p.is_linear]).T)  # fmt: skip
             assert own <= ((STRESS - basis @ inside) ** 2).sum() * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("factor", [1e-4, 1e3])
+def test_the_unit_of_the_stress_does_not_matter(factor):
+    stretch = np.linspace(0.8, 1.3, 11)
+    data = tq.simulate("ogden-1", {"mu1": 0.4 * factor, "alpha1": 3.0}, stretch)
+    posterior = tq.fit(data, material="ogden-1", discrepancy="none", noise_sd=0.01 * factor)
+    found = least_squares(data, posterior.model.material, posterior.model.priors)
+    np.testing.assert_allclose(found.values, [0.4 * factor, 3.0], rtol=1e-6)
+
+
+def test_exponents_whose_stress_is_beyond_all_numbers_are_left_out():
+    priors = {"mu": tq.Uniform(1e-3, 0.1), "b": tq.Uniform(0, 800)}
+    found = least_squares(BRAIN, material_named("demiray"), priors)
+    assert 0 < found.values[1] < 100
+    assert found.nrmse < 1
+
+
+def test_equal_stresses_have_no_variance_to_explain():
+    data = tq.Experiment("uniaxial", [1.2, 1.2], [0.01, 0.01])
+    assert np.isnan(least_squares(data, material_named("neo-hookean"), {"C10": tq.Uniform(0, 1)}).r_squared)

@@ -33,7 +33,9 @@ class FitOptions(Written):
     specimen: tuple[str, ...] = option(
         (), "Name of the specimen, once for each of several files [each its own].", group="Reading files"
     )
-    workers: int | None = option(None, "Processes on this machine [one a core].", ge=1)
+    workers: int | None = option(
+        None, "Processes that several laws are divided among [one a core from four laws].", ge=1
+    )
 
 
 @command(SpecimenSettings, FitOptions)

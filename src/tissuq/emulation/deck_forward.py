@@ -20,7 +20,7 @@ from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.export import Cards, CardSettings, card_format, check_fibres
+from tissuq.export import CardFormat, Cards, CardSettings, FECode, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
 
 __all__ = ["DeckForward"]
@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 SOLVED = "solver"
 """Folder with a folder for each run of the solver."""
 ALLOWED_VALUE = 0.1
-"""A value that every parameter of a law with fibres may have: stress, rate, dispersion, and angle in radians."""
+"""A value that every parameter of fibres in a neo-Hookean matrix may have: stress, rate, dispersion, radians."""
 PLACES = 16
 """Digits of a digest that name the folder of a run."""
 
@@ -169,6 +169,8 @@ class DeckForward(Forward):
             )
         name = self.read_deck.material(self.replaced).name
         if not self.law.is_isotropic:
+            if isinstance(code := self._code, FECode):
+                code.check_fibres(self.law)
             check_fibres(name, self._cards(dict.fromkeys(wanted, ALLOWED_VALUE)))
         self.program.check_installed()
         extra_files(self.read_deck, self.also, Path())
@@ -216,6 +218,11 @@ class DeckForward(Forward):
         digest = sha256(repr(sorted(parameters.items())).encode()).hexdigest()
         return self.folder / SOLVED / f"run-{digest[:PLACES]}"
 
+    @property
+    def _code(self) -> CardFormat:
+        """What writes the card."""
+        return card_format(self.card_format or self.program.card_format or self.read_deck.format.card_format)
+
     def _block(self, parameters: Mapping[str, float]) -> str:
         """Return the material with parameters in the unit of the model, as the deck has it."""
         return self._cards(parameters).blocks[0]
@@ -225,11 +232,10 @@ class DeckForward(Forward):
         law, number = self.law, self.read_deck.material(self.replaced).number
         in_mpa = {p.symbol: parameters[p.symbol] / (self.cards.factor if p.unit else 1.0) for p in law.parameters}
         drawn = card_material(law, tuple(in_mpa.values()), self.stretch, self.mode)
-        name = self.card_format or self.program.card_format or self.read_deck.format.card_format
         settings = replace(self.cards, number=int(number) if number.isdecimal() else 1)
-        cards = card_format(name).cards(drawn, settings)
+        cards = self._code.cards(drawn, settings)
         if not cards.blocks:
-            raise UnreadableError(f"cards of the format '{name}' do not go into a deck.")
+            raise UnreadableError(f"cards of the format '{self._code.name}' do not go into a deck.")
         return cards
 
     def _at(self, control: FloatArray, name: str, curves: Mapping[str, Any], problem: str) -> FloatArray:

@@ -137,6 +137,11 @@ def _experiment(
     points = np.linspace(low, high, POINTS)
     points = points[np.abs(points - 1) > 1e-9]
     if not law.is_isotropic:
+        if high <= 1:
+            raise InputError(
+                f"material '{law.name}' has fibres, which bear load where they are stretched: give a range of the "
+                f"stretch that goes beyond 1, not {low:g}:{high:g}."
+            )
         loading, still = loading_mode("biaxial"), np.ones_like(points)
         points = np.vstack([np.column_stack(axes) for axes in ((points, still), (still, points), (points, points))])
     stresses = [engineering_stress(law, path, points, values).mean(axis=0) for path in loading.paths]

@@ -27,9 +27,10 @@ from tissuq.export.cards import (
 from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.fibres import FIBRE_AXES, FibreForm, fibre_sentences, initial_stiffness
 from tissuq.export.judgement import JudgedLaw
-from tissuq.export.laws import Form, Law, exact_law
+from tissuq.export.laws import Form, Law, exact_law, sum_of, summands_of
 from tissuq.export.projection import Projection, projections
 from tissuq.export.states import moduli
+from tissuq.mechanics import Material
 from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["Card", "FECode"]
@@ -161,7 +162,10 @@ class FECode(CardFormat):
         form = self.form_of(law) if law is not None else None
         draws = DrawStresses(ensemble)
         if form is None and not ensemble[0].is_isotropic:
-            raise InputError(self._why_no_fibres(ensemble, settings))
+            name = ensemble[0].parts[0][0].name
+            if settings.law is not None:
+                raise InputError(f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out.")
+            raise InputError(self._why_no_fibres(name, law))
         if law is not None and form is not None:
             return JudgedLaw.of(draws, law, form, None), ()
         candidates = [self._projected(draws, projection) for projection in self._requested(settings)]
@@ -171,12 +175,21 @@ class FECode(CardFormat):
             rivals = [self._projected(draws, other) for other in self.projections if other != best.projection]
         return best, rivals
 
-    def _why_no_fibres(self, ensemble: Ensemble, settings: CardSettings) -> str:
-        """Return why draws with fibres have no card here, and which codes have one."""
-        name = ensemble[0].parts[0][0].name
-        if settings.law is not None:
-            return f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out."
-        law, codes = exact_law(ensemble), [kind() for kind in card_formats().values()]
+    def check_fibres(self, material: Material) -> None:
+        """Refuse a material with fibres that has no card here, whatever its values are.
+
+        Raises
+        ------
+        InputError
+            Which names the codes that have one.
+        """
+        law = sum_of(list(summands_of(material, np.ones((1, len(material.parameters))))))
+        if law is None or self.form_of(law) is None:
+            raise InputError(self._why_no_fibres(material.name, law))
+
+    def _why_no_fibres(self, name: str, law: Law | None) -> str:
+        """Return why a law with fibres has no card here, and which codes have one."""
+        codes = [kind() for kind in card_formats().values()]
         able = sorted(code.name for code in codes if law and isinstance(code, FECode) and code.form_of(law))
         advice = (
             f"write cards for {' or '.join(able)}."

@@ -26,7 +26,18 @@ from tissuq.mechanics.laws import (
 )
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
-__all__ = ["Constants", "Form", "Law", "LibraryForm", "OgdenForm", "PolynomialForm", "exact_law", "parts_of"]
+__all__ = [
+    "Constants",
+    "Form",
+    "Law",
+    "LibraryForm",
+    "OgdenForm",
+    "PolynomialForm",
+    "exact_law",
+    "parts_of",
+    "sum_of",
+    "summands_of",
+]
 
 FloatArray = NDArray[np.float64]
 Constants = dict[str, float]
@@ -69,9 +80,11 @@ def exact_law(ensemble: Ensemble) -> Law | None:
     Polynomials add up to a Rivlin polynomial, Ogden terms (with those of Mooney and Rivlin, if any) to an Ogden sum;
     any other material stands alone. Fibres are added to a polynomial.
     """
-    if any(draw.discrepancy is not None for draw in ensemble):
-        return None
-    summands = list(parts_of(ensemble))
+    return None if any(draw.discrepancy is not None for draw in ensemble) else sum_of(list(parts_of(ensemble)))
+
+
+def sum_of(summands: list[tuple[Material, FloatArray]]) -> Law | None:
+    """Return the one law that materials with values (N, k) add up to, as `exact_law` says, if there is one."""
     fibres = [summand for summand in summands if not summand[0].is_isotropic]
     if fibres:
         return _with_fibres([summand for summand in summands if summand[0].is_isotropic], fibres)
@@ -95,10 +108,14 @@ def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[M
 def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:
     """Return the materials that draws are sums of, one by one, with their values (N, k)."""
     for index, (material, _) in enumerate(ensemble[0].parts):
-        values = np.array([draw.parts[index][1] for draw in ensemble])
-        materials = material.summands if isinstance(material, MaterialSum) else (material,)
-        ends = pairwise(accumulate((len(material.parameters) for material in materials), initial=0))
-        yield from ((material, values[:, start:end]) for material, (start, end) in zip(materials, ends, strict=True))
+        yield from summands_of(material, np.array([draw.parts[index][1] for draw in ensemble]))
+
+
+def summands_of(material: Material, values: FloatArray) -> Iterator[tuple[Material, FloatArray]]:
+    """Return the materials that one is the sum of, with their values (N, k)."""
+    materials = material.summands if isinstance(material, MaterialSum) else (material,)
+    ends = pairwise(accumulate((len(material.parameters) for material in materials), initial=0))
+    yield from ((material, values[:, start:end]) for material, (start, end) in zip(materials, ends, strict=True))
 
 
 def _polynomial(summands: list[tuple[Material, FloatArray]]) -> Law:

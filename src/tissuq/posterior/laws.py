@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
@@ -323,15 +323,18 @@ def fit_laws(
         foreign_symbols = symbols - {parameter.symbol for parameter in law.parameters}
         chosen_priors = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in foreign_symbols}
         tasks[name] = partial(LawFit.of, data, law, chosen_priors, options)
+    futures = dict[str, Future[LawFit]]()
     if pool is not None:  # the laws of most parameters, which take longest, begin
-        tasks |= {name: pool.submit(tasks[name]).result for name in reversed(tasks)}
+        futures = {name: pool.submit(tasks[name]) for name in reversed(tasks)}
     fits = dict[str, LawFit]()
     for name, task in tasks.items():
         step(name)
         try:
-            fits[name] = task()
+            fits[name] = futures[name].result() if futures else task()
         except (ConvergenceError, ModelError, InputError) as error:
             if not is_all or (not fits and isinstance(error, InputError)):
+                for future in futures.values():
+                    future.cancel()
                 raise
             skipped[name] = str(error)
     if not fits:

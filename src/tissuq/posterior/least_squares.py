@@ -39,7 +39,8 @@ class LeastSquares:
     values : (k,) array
         Its parameters, in MPa where they are stresses.
     r_squared, nrmse : float
-        Share of the variance of the stress that it explains, and its root mean square error over that of the stress.
+        Share of the variance of the stress that it explains (missing where all stresses are the same), and its root
+        mean square error over that of the stress.
     """
 
     material: Material
@@ -85,18 +86,23 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
 
     step = max(1, data.size // MAX_SEARCHED)
     states, stress = data.states.thinned(step), np.concatenate([curve.stress[::step] for curve in data.curves])
+    unit = float(np.linalg.norm(stress)) or 1.0  # searches end where gradients are small as numbers
+    stress = stress / unit
     is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    supports = [priors[parameter.symbol].support for parameter in material.parameters if parameter.is_linear]
+    supports = [
+        np.divide(priors[parameter.symbol].support, unit) for parameter in material.parameters if parameter.is_linear
+    ]
     bent = [priors[parameter.symbol] for parameter in material.parameters if not parameter.is_linear]
 
     def values_at(scores: FloatArray) -> FloatArray:
         return np.array([prior.quantile(ndtr(score)) for prior, score in zip(bent, scores.T, strict=True)]).T
 
     def linear(basis: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the linear parameters and the residual."""
-        if not np.isfinite(basis).all():
+        """Return the linear parameters and the residual, both over the unit."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+        if not np.isfinite(size).all():
             return np.zeros(basis.shape[1]), MISFIT_OF_NOTHING * stress
-        size = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
         low, high = np.array(supports).T * size
         scaled = lsq_linear(basis / size, stress, (low, high)).x
         return scaled / size, stress - basis @ (scaled / size)
@@ -114,13 +120,14 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
         scores = min(found, key=lambda result: result.cost).x[None]
     values = np.empty(len(is_linear))
     values[~is_linear] = values_at(scores)[0] if bent else []
-    values[is_linear] = linear(stress_basis(material, states, values[~is_linear]))[0]
+    values[is_linear] = unit * linear(stress_basis(material, states, values[~is_linear]))[0]
     measured, left = data.measured, data.measured - _stress(material, data.states, values)
     if not np.isfinite(left).all():
         raise ModelError(f"material '{material.name}' has no stress at some of the measurements.")
     total = ((measured - measured.mean()) ** 2).sum()
     nrmse = float(np.sqrt((left**2).mean() / (measured**2).mean()))
-    return LeastSquares(material, values, float(1 - (left**2).sum() / total), nrmse)
+    r_squared = float(1 - (left**2).sum() / total) if total else np.nan
+    return LeastSquares(material, values, r_squared, nrmse)
 
 
 def _stress(material: Material, states: States, values: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
-from tissuq.mechanics.material import materials
+from tissuq.mechanics.user_law import LAW
 from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, merged, most_severe_first
@@ -80,15 +80,16 @@ def run_laws(
     step: Callable[[str], None] = lambda text: None,
     own: Mapping[str, Material] | None = None,
     found: Sequence[Reading | None] = (),
-    workers: int | None = None,
+    workers: int | None = 1,
 ) -> LawStudy:
     """Read the file, or those of several tests, and fit every chosen law.
 
     What has been read of every test may be given as ``found``.
 
     Settings may come from a file, so that laws of the user's own which they name are not run; these are given as
-    ``own``, by the names in the settings. Laws are divided among processes on this machine: so many ``workers``, or one
-    for each core where there are several laws; those of the user's own are not.
+    ``own``, by the names in the settings. Laws are divided among so many ``workers``, processes on this machine, or
+    where that is None one for each core from `MIN_DIVIDED` laws; beside a law in a file of the user, which other
+    processes do not know, they are not divided.
 
     Raises
     ------
@@ -99,9 +100,8 @@ def run_laws(
     experiment = Experiment.of([reading.experiment for reading in readings])
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
     laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
-    are_known = all(type(law) in materials().values() for law in laws.values())  # to processes that start
     one_a_core = 1 if len(laws) < MIN_DIVIDED else os.cpu_count() or 1
-    processes = min(workers or one_a_core, len(laws)) if are_known else 1
+    processes = 1 if any(map(LAW.search, settings.laws)) else min(workers or one_a_core, len(laws))
     with _loss_in_words(), open_pool(processes) as pool:
         comparison = fit_laws(
             experiment,

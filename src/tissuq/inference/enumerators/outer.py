@@ -11,6 +11,7 @@ from tissuq.inference.enumerators.lattice import Rows
 from tissuq.inference.enumerators.line import Line
 from tissuq.inference.marginal import Marginal, marginal_of_table
 from tissuq.inference.quasi_monte_carlo import log_normal
+from tissuq.model.scales import off_zero
 from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["MAX_SCORE", "TINY", "Outer"]
@@ -51,7 +52,7 @@ class Outer:
 
         probability = ndtr(np.clip(point, -MAX_SCORE, MAX_SCORE))
         quantiles = [
-            float(self._model.priors[symbol].quantile(p)) for symbol, p in zip(self.symbols, probability, strict=True)
+            off_zero(self._model.priors[symbol], float(p)) for symbol, p in zip(self.symbols, probability, strict=True)
         ]
         return np.where(self.of_noise, np.exp(self._middle + LOG_RATIO_SD * point), quantiles)
 
