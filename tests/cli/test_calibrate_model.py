@@ -163,6 +163,18 @@ def test_files_that_several_models_need_are_copied_for_each_and_the_run_is_repea
         assert {"mesh.inp", "fibres.txt"} <= copies
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "advice"),
+    [("--range", "1.3:0.7", "two rising positive numbers, not 1.3:0.7"), ("--mode", "uniaxail", "uniaxial")],
+)
+def test_a_range_that_is_none_is_refused_before_anything_is_run(cli, here, words, option, value, advice):
+    forces(here)
+    before = {path.name for path in here.iterdir()}
+    said = cli(*words, *WIDE, option, value)
+    assert (said.status, advice in said.err) == (2, True)
+    assert {path.name for path in here.iterdir()} == before
+
+
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
 def test_what_is_killed_in_a_second_model_keeps_the_run_of_the_first(cli, here, words):
     """Only the run of the solver that was going on is made again: 17 of two models at 8 points."""

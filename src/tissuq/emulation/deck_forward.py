@@ -18,7 +18,7 @@ from tissuq.decks.model_files import MODEL, copy_model, extra_files
 from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, problem_of, sets_of
 from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
-from tissuq.emulation.material_posterior import card_material
+from tissuq.emulation.material_posterior import card_material, points_of_range
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.export import CardFormat, Cards, CardSettings, FECode, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
@@ -167,6 +167,7 @@ class DeckForward(Forward):
                 f"the material {self.law.name} in the model has the parameters {', '.join(wanted)}; those with priors "
                 f"are {', '.join(symbols)}."
             )
+        points_of_range(self.law, self.mode, self.stretch)
         name = self.read_deck.material(self.replaced).name
         if not self.law.is_isotropic:
             if isinstance(code := self._code, FECode):

@@ -26,7 +26,7 @@ from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Solver
 
-__all__ = ["card_material", "check_material", "material_posterior"]
+__all__ = ["card_material", "check_material", "material_posterior", "points_of_range"]
 
 POINTS = 20
 """Number of stretches that stand for the range."""
@@ -124,11 +124,26 @@ def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float
 def _experiment(
     law: Material, values: NDArray[np.float64], loading: LoadingMode, stretch: tuple[float, float]
 ) -> Experiment:
-    """Return the mean stress of parameters (N, k) at points of a range, which stand for what was measured.
+    """Return the mean stress of parameters (N, k) at points of a range, which stand for what was measured."""
+    loading, points = points_of_range(law, loading, stretch)
+    stresses = [engineering_stress(law, path, points, values).mean(axis=0) for path in loading.paths]
+    return Experiment(loading, points, np.column_stack(stresses) if len(stresses) > 1 else stresses[0])
 
-    Of a law with fibres these are both stresses of a sheet that is stretched along one axis, the other, and both: most
-    modes do not say how it deforms.
+
+def points_of_range(
+    law: Material, mode: str | LoadingMode, stretch: tuple[float, float]
+) -> tuple[LoadingMode, NDArray[np.float64]]:
+    """Return a loading mode and points (n,) or (n, 2) of it, over which a law is known.
+
+    Of a law with fibres these are points of a sheet that is stretched along one axis, the other, and both: most modes
+    do not say how it deforms.
+
+    Raises
+    ------
+    InputError, ModelError
+        When there is no such mode, or one with several controls, or the range is none.
     """
+    loading = loading_mode(mode)
     if len(loading.controls) != 1:
         raise InputError(f"the mode '{loading.name}' has several controls: give the range in one with one control.")
     low, high = map(float, stretch)
@@ -144,8 +159,7 @@ def _experiment(
             )
         loading, still = loading_mode("biaxial"), np.ones_like(points)
         points = np.vstack([np.column_stack(axes) for axes in ((points, still), (still, points), (points, points))])
-    stresses = [engineering_stress(law, path, points, values).mean(axis=0) for path in loading.paths]
-    return Experiment(loading, points, np.column_stack(stresses) if len(stresses) > 1 else stresses[0])
+    return loading, points
 
 
 def check_material(

@@ -109,9 +109,9 @@ def _next_step(study: CalibrationStudy) -> str:
     if not calibration.converged:
         return "make the posterior converge: repeat it with --method nuts, or narrower priors."
     if max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols) > LARGE_SHARE:
-        return "make the emulator more accurate where the posterior is: repeat the command with --refine 20."
+        return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."
     if not calibration.problem.discrepancy.is_correlated:
-        return "let the forward model be wrong: repeat the command with --discrepancy gp."
+        return "let the forward model be wrong: repeat the command with --discrepancy gp-pinned --force."
     if study.posterior is not None:
         return "take the material further: tissuq predict, export or structure {run}"
     return "name the law of the model with --material LAW; predict, export and structure then take the run."
