@@ -12,25 +12,13 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from class_law import SIMPLE
 from tissuq.studies import laws
 
 from .conftest import STRESS_KPA, STRETCH, tree
 
 ALONE = ["--discrepancy", "none", "--noise-sd", "1", "--estimand", "as-tested"]
 TWO = ["--material", "neo-hookean", "--material", "mooney-rivlin"]
-CLASS_LAW = """
-from tissuq import Material, Parameter
-
-
-class Own(Material):
-    name = "law-in-a-class-of-a-test"
-    formula = "C (I1 - 3)"
-    source = "this test"
-    parameters = (Parameter("C", "half the modulus"),)
-
-    def strain_energy(self, I1, I2, values):
-        return values[0] * (I1 - 3)
-"""
 LAW = """
 def softening(I1, I2, mu, k):
     return mu * (I1 - 3) / 2 - k * (I1 - 3) ** 2
@@ -134,8 +122,8 @@ def test_a_law_of_ones_own_takes_part(cli, here, specimen):
 
 
 def test_a_law_in_a_class_of_ones_own_is_fitted_where_it_is_known(cli, here, specimen):
-    (here / "law.py").write_text(CLASS_LAW)
-    said = cli("fit", specimen, "--material", "law.py:Own", *TWO, *ALONE, "--workers", 2, "--no-figures")
+    (here / "laws.py").write_text(f"from tissuq import Material, Parameter\n\n\n{SIMPLE}")
+    said = cli("fit", specimen, "--material", "laws.py:Simple", *TWO, *ALONE, "--workers", 2, "--no-figures")
     assert said.status == 0, said.err
     assert len(rows_of(here / "runs" / "specimen")) == 3
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from class_law import SIMPLE
 from loading import MEASURED
 from tissuq import registry
 from tissuq.mechanics import material_named, named
 
-LAWS = '''
+LAWS = f'''
 import jax
 import jax.numpy as jnp
 from tissuq import Material, Parameter, Uniform
@@ -24,15 +25,7 @@ def exponential(I1, I2, mu, b=Uniform(0.1, 20)):
 def logarithmic(l1, l2, l3, mu):
     return mu * sum(jnp.log(each) ** 2 for each in (l1, l2, l3))
 
-class Simple(Material):
-    name = "simple-law-of-a-test"
-    formula = "C (I1 - 3)"
-    source = "this test"
-    parameters = (Parameter("C", "half the modulus"),)
-
-    def strain_energy(self, I1, I2, values):
-        return values[0] * (I1 - 3)
-
+{SIMPLE}
 made = Simple()
 number = 3
 

@@ -171,7 +171,7 @@ class DeckForward(Forward):
         name = self.read_deck.material(self.replaced).name
         if not self.law.is_isotropic:
             if isinstance(code := self._code, FECode):
-                code.check_fibres(self.law)
+                code.check_has_card(self.law)
             check_fibres(name, self._cards(dict.fromkeys(wanted, ALLOWED_VALUE)))
         self.program.check_installed()
         extra_files(self.read_deck, self.also, Path())

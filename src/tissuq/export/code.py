@@ -175,7 +175,7 @@ class FECode(CardFormat):
             rivals = [self._projected(draws, other) for other in self.projections if other != best.projection]
         return best, rivals
 
-    def check_fibres(self, material: Material) -> None:
+    def check_has_card(self, material: Material) -> None:
         """Refuse a material with fibres that has no card here, whatever its values are.
 
         Raises

@@ -107,7 +107,7 @@ def _repeated(settings: CalibrationSettings) -> str:
 def _next_step(study: CalibrationStudy) -> str:
     calibration = study.calibration
     if not calibration.converged:
-        return "make the posterior converge: repeat it with --method nuts, or narrower priors."
+        return "make the posterior converge: repeat the command with --method nuts --force, or narrower priors."
     if max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols) > LARGE_SHARE:
         return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."
     if not calibration.problem.discrepancy.is_correlated:
