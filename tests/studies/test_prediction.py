@@ -64,7 +64,7 @@ def test_bands_are_those_of_the_posterior(fits):
 
 def test_the_usual_stretches_are_the_calibrated_ones(fits, data):
     found = predicted(fits["none"], mode="planar", points=7)
-    ends = calibrated_range(data, loading_mode("planar"))
+    ends = calibrated_range(fits["none"].model, loading_mode("planar"))
     np.testing.assert_allclose(found.points, np.linspace(*ends, 7), rtol=1e-12)
     assert found.is_calibrated.all()
     assert not found.warnings
@@ -75,12 +75,13 @@ def test_beside_data_the_stretches_reach_to_them_and_no_further_than_rest_on_the
     found = predicted(fits["none"], data=planar)
     assert found.mode.name == "planar"
     assert found.points[0] == 1.0
-    assert found.points[-1] == max(planar.stretch.max(), calibrated_range(data, loading_mode("planar"))[1])
+    _, high = calibrated_range(fits["none"].model, loading_mode("planar"))
+    assert found.points[-1] == max(planar.stretch.max(), high)
 
 
 def test_what_is_beyond_the_data_is_marked_and_told_once(fits, data, planar):
     found = predicted(fits["none"], mode="planar", stretch=[0.5, 1.0, 1.3, 3.0], data=planar)
-    low, high = calibrated_range(data, loading_mode("planar"))
+    low, high = calibrated_range(fits["none"].model, loading_mode("planar"))
     assert found.is_calibrated.tolist() == [False, True, True, False]
     assert found.table["is_calibrated"].tolist() == found.is_calibrated.tolist()
     (told,) = [text for text in found.warnings if "calibrated" in text]

@@ -353,7 +353,7 @@ def scores_of(
         predicted = judged(solution, curve, discrepancy=discrepancy, prob=prob)
         predicted = predicted.times(ratio(predicted.points))
         labels = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity}
-        for name, in_range in _ranges(is_calibrated(solution.model.experiment, curve.mode, predicted.points)).items():
+        for name, in_range in _ranges(is_calibrated(solution.model, curve.mode, predicted.points)).items():
             rows.append(labels | {"range": name, "count": int(in_range.sum())} | predicted.where(in_range).summary())
     return pd.DataFrame(rows)
 

@@ -16,7 +16,7 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution, are_isotropic
 from tissuq.mechanics import Material
-from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
+from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.mechanics.rays import through
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
@@ -30,6 +30,8 @@ __all__ = [
     "are_stable",
     "calibrated_range",
     "is_calibrated",
+    "measured_range",
+    "measured_states",
     "stability",
     "stability_modes",
     "stability_over",
@@ -159,7 +161,7 @@ def stability_over(
     if len(loading.controls) > 1:
         raise InputError(f"stability is computed in modes of one control, and '{loading.name}' has several.")
     if stretch is None:
-        stretch = np.linspace(*calibrated_range(data, loading), points)
+        stretch = np.linspace(*measured_range(data, loading), points)
     return stability(solution, loading, np.atleast_1d(np.asarray(stretch, dtype=float)))
 
 
@@ -252,10 +254,10 @@ def _measured(data: Experiment, mode: LoadingMode, reach: float = 1.0) -> FloatA
 
     Of a larger reach, up to so many times the measured invariants.
     """
-    ends = calibrated_range(data, mode)
+    ends = measured_range(data, mode)
     if reach > 1:
-        I1, I2 = largest_invariants(data.states)
-        ends = farthest_stretch(mode, (reach * I1, reach * I2), -1), farthest_stretch(mode, (reach * I1, reach * I2), 1)
+        states = MeasuredStates.of(data.states).times(reach)
+        ends = farthest_stretch(mode, states, -1), farthest_stretch(mode, states, 1)
     return np.unique(np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE) for end in ends]))
 
 
@@ -312,28 +314,43 @@ def _criteria(
     return baker, drucker, rising
 
 
-def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]:
-    """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
-    measured = [curve.abscissa for curve in data.curves if curve.mode == mode]
-    if measured:
-        reference = float(mode.reference)
-        values = np.concatenate([[reference], *measured])
-        return float(values.min()), float(values.max())
-    largest = largest_invariants(data.states)
-    return farthest_stretch(mode, largest, -1), farthest_stretch(mode, largest, 1)
+def calibrated_range(model: StatisticalModel, mode: LoadingMode) -> tuple[float, float]:
+    """Return the stretches of a mode up to which states were measured.
+
+    Those are states in which I1, I2 and, of a material with fibres, the stretches along the axes are in the measured
+    range.
+    """
+    return measured_range(model.experiment, mode, measured_states(model))
 
 
-def is_calibrated(data: Experiment, mode: LoadingMode, points: FloatArray) -> Flags:
-    """Return at which points of a mode, (g,) or (g, c), the invariants stay in the range that was measured.
+def is_calibrated(model: StatisticalModel, mode: LoadingMode, points: FloatArray) -> Flags:
+    """Return at which points of a mode, (g,) or (g, c), the state is among those that were measured.
 
     With one control that is `calibrated_range`.
     """
     if len(mode.controls) == 1:
-        low, high = calibrated_range(data, mode)
+        low, high = calibrated_range(model, mode)
         margin = 1e-9 * max(abs(low), abs(high))
         return np.asarray((low - margin <= points) & (points <= high + margin))
-    pairs = zip(invariants(mode.paths[0].at(points)), largest_invariants(data.states), strict=True)
-    return np.asarray(np.logical_and.reduce([values <= largest * (1 + 1e-9) for values, largest in pairs]))
+    return measured_states(model).contain(mode.paths[0].at(points))
+
+
+def measured_states(model: StatisticalModel) -> MeasuredStates:
+    """Return the states up to which the material of a model was measured."""
+    return MeasuredStates.of(model.experiment.states, is_isotropic=model.material.is_isotropic)
+
+
+def measured_range(data: Experiment, mode: LoadingMode, states: MeasuredStates | None = None) -> tuple[float, float]:
+    """Return the stretches of a mode that were measured or, where it was not, up to states.
+
+    Those are the ones of the measured I1 and I2 unless others are given.
+    """
+    measured = [curve.abscissa for curve in data.curves if curve.mode == mode]
+    if measured:
+        values = np.concatenate([[float(mode.reference)], *measured])
+        return float(values.min()), float(values.max())
+    states = states or MeasuredStates.of(data.states)
+    return farthest_stretch(mode, states, -1), farthest_stretch(mode, states, 1)
 
 
 def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:

@@ -11,7 +11,7 @@ from tissuq.experiments.modes import States, curve_modes
 from tissuq.export.constrained_fit import Inequalities
 from tissuq.export.states import SeenStates
 from tissuq.mechanics import Material, stress_basis
-from tissuq.mechanics.invariants import farthest_stretch
+from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.mechanics.rays import through
 
 __all__ = ["StabilityRows", "StabilityStates", "least_eigenvalues", "wanted_stiffness"]
@@ -104,7 +104,7 @@ class StabilityRows:
         tangents = states.hessian(stress_basis(material, states.nudged, setting))
         slopes = []
         for mode in curve_modes():
-            ends = (farthest_stretch(mode, max_invariants, side) for side in (-1, 1))
+            ends = (farthest_stretch(mode, MeasuredStates(*max_invariants), side) for side in (-1, 1))
             stretch = np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE + 1)[1:] for end in ends])
             high, low = (stress_basis(material, mode.at(stretch + sign * LOG_STEP), setting) for sign in (1, -1))
             slopes.append((high - low) / (2 * LOG_STEP))

@@ -17,7 +17,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.mechanics import Material
-from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
+from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch, invariants, largest_invariants
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import values_of
 
@@ -159,9 +159,8 @@ def _name(mode: LoadingMode, low: float, high: float, count: int) -> str:
 
 def farthest_range(data: Experiment, mode: LoadingMode, factor: float) -> tuple[float, float]:
     """Return the range of a mode's control in which I1 - 3 and I2 - 3 are at most so many times what was measured."""
-    I1, I2 = largest_invariants(data.states)
-    limits, reference = (factor * I1, factor * I2), float(mode.reference)
-    low, high = (_rounded(farthest_stretch(mode, limits, sign), reference) for sign in (-1, 1))
+    states, reference = MeasuredStates.of(data.states).times(factor), float(mode.reference)
+    low, high = (_rounded(farthest_stretch(mode, states, sign), reference) for sign in (-1, 1))
     return low, high
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stability
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, measured_states, stability
 from tissuq.errors import InputError, ModelError
 from tissuq.inference.solution import Solution
 from tissuq.next_test.candidates import (
@@ -17,7 +17,6 @@ from tissuq.next_test.candidates import (
     Target,
     candidate_named,
     default_candidates,
-    reach_of,
     target_named,
 )
 from tissuq.next_test.next_test import NextTest, Specimen
@@ -112,7 +111,8 @@ def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_reques
             raise
         expected, problem = None, str(error)
     model = next_test.model
-    share_beyond = float((reach_of(model.experiment, candidate.mode, candidate.stretch) > MAX_MEASURED_REACH).mean())
+    measured = measured_states(model).times(MAX_MEASURED_REACH)
+    share_beyond = 1 - float(measured.contain(candidate.mode.paths[0].at(candidate.stretch)).mean())
     notes = [f"{share_beyond:.0%} beyond the data"] * (share_beyond > 0)
     notes += [f"stable up to there: {stable:.0%}"] * (stable < 1 - MIN_LOSS_PROBABILITY)
     notes += [FEW_COMPONENTS] * (expected is not None and expected.is_rough) + [problem] * bool(problem)

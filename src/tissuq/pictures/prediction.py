@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment.stability import calibrated_range, is_calibrated
+from tissuq.assessment.stability import calibrated_range, is_calibrated, measured_range
 from tissuq.drawing.panels import Panels, limits_of, within
 from tissuq.drawing.pieces import band, cut_off, line, outside, points
 from tissuq.drawing.style import BASE, INK, relative_size
@@ -65,7 +65,7 @@ class Predicted:
     stress, measurements : Band
         Of the stress itself, and of new measurements of it.
     is_calibrated : (g,) array of bool
-        Where both invariants were measured.
+        Where the state is among those that were measured.
     calibrated : (float, float) or None
         The ends of that range; None where several controls make it no interval.
     ways : list of Way
@@ -95,16 +95,15 @@ def stretches_to_show(solution: Solution, mode: LoadingMode, reach: float = REAC
     InputError
         When the mode has several controls and was not measured.
     """
-    data = solution.model.experiment
     if len(mode.controls) > 1:
-        measured = next((curve.points for curve in data.curves if curve.mode == mode), None)
+        measured = next((curve.points for curve in solution.model.experiment.curves if curve.mode == mode), None)
         if measured is None:
             names = " and ".join(control.name for control in mode.controls)
             raise InputError(
                 f"'{mode.name}' has several controls ({names}): say where to predict by stretch=, a row for each point."
             )
         return measured
-    low, high = calibrated_range(data, mode)
+    low, high = measured_range(solution.model.experiment, mode)
     wider = reach * (high - low)
     lowest, reference = mode.controls[0].above, float(mode.reference)
     start = low if np.isclose(low, reference) else max(low - wider, low - 0.5 * (low - lowest))
@@ -133,7 +132,7 @@ def predictions(
 
 
 def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob: float) -> list[Predicted]:
-    data, model = solution.model.experiment, solution.model
+    model = solution.model
     is_joint, several = speaks_of(model, mode), len(mode.controls) > 1
     predictions = []
     for channel, quantity in enumerate(mode.stresses):
@@ -144,8 +143,8 @@ def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob
                 abscissa=stress.stretch,
                 stress=stress,
                 measurements=noisy,
-                is_calibrated=is_calibrated(data, mode, points),
-                calibrated=None if several else calibrated_range(data, mode),
+                is_calibrated=is_calibrated(model, mode, points),
+                calibrated=None if several else calibrated_range(model, mode),
                 ways=ways_of(mode, points, stress.stretch),
                 measured=_measured(solution, mode, channel),
                 label="stretch" if several else mode.controls[0].name,

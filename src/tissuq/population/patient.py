@@ -217,7 +217,7 @@ def patient_curves(
         + error
         * (patient_modulus / np.maximum(specimen_modulus, MIN_MODULUS_RATIO * np.median(specimen_modulus)))[:, None]
     )
-    low, high = calibrated_range(model.experiment, mode)
+    low, high = calibrated_range(model, mode)
     return np.where((stretch < low - STRETCH_STEP) | (stretch > high + STRETCH_STEP), np.nan, curves)
 
 

@@ -229,7 +229,7 @@ class Ensemble(Sequence[EnergyDraw]):
                 f"{', '.join(self.ranges)}."
             )
         if stretch is None:
-            at = np.linspace(*calibrated_range(self.model.experiment, loading), PLOT_POINTS)
+            at = np.linspace(*calibrated_range(self.model, loading), PLOT_POINTS)
         else:
             at = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
         with panels(ax, 1) as drawn:
@@ -350,7 +350,7 @@ def _curves(draws: Sequence[EnergyDraw], indices: NDArray[np.intp]) -> Callable[
 def _ranges(model: StatisticalModel, modes: Sequence[LoadingMode]) -> dict[str, tuple[float, float]]:
     """Return the measured stretches of modes; with fibres, those along the axes of the test."""
     if model.material.is_isotropic:
-        return {mode.name: calibrated_range(model.experiment, mode) for mode in modes}
+        return {mode.name: calibrated_range(model, mode) for mode in modes}
     columns = np.sqrt(1 + model.experiment.states.axis_strains[0]).T
     return {
         f"axis {axis}": (min(1.0, *map(float, column)), max(1.0, *map(float, column)))

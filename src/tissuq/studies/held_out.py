@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from tissuq.assessment.stability import measured_states
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.mechanics.invariants import invariants, largest_invariants
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.scores import judged
@@ -77,17 +75,14 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
     -------
     list of dict
         test, mode, measured; ``inside``, the share of measurements in the predictive band; ``beyond``, the share of
-        them at which an invariant is larger than it was in the data of the posterior; and of the others the further
+        them whose state is beyond those in the data of the posterior; and of the others the further
         scores of `tissuq.prediction.scores.Judged.summary`. Measurements without stress are left out, and the band is
         that of a new test with an error of its own.
     """
-    largest, rows = largest_invariants(posterior.model.experiment.states), []
+    measured, rows = measured_states(posterior.model), []
     for curve in test.curves:
         judged_all = judged(posterior.solution, curve, prob=prob)
-        reached = invariants(curve.path.at(judged_all.points))
-        calibrated = np.logical_and.reduce(
-            [invariant <= end * (1 + 1e-9) for invariant, end in zip(reached, largest, strict=True)]
-        )
+        calibrated = measured.contain(curve.path.at(judged_all.points))
         labels: dict[str, Any] = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity}
         shares = {"inside": float(judged_all.is_inside.mean()), "beyond": float(1 - calibrated.mean())}
         rows.append(labels | judged_all.where(calibrated).summary() | shares)

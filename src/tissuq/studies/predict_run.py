@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment.stability import is_calibrated
+from tissuq.assessment.stability import is_calibrated, measured_range, measured_states
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.mechanics import Material
-from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
@@ -105,7 +104,7 @@ def _extrapolated(
     posterior: Posterior, mode: LoadingMode, grid: FloatArray, channel: int, band: Band, **options: Any
 ) -> FloatArray:
     """Return the share (g,) of the variance of a stress due to how the energy goes on beyond the measured range."""
-    is_beyond, shares = ~is_calibrated(posterior.model.experiment, mode, grid), np.zeros(len(grid))
+    is_beyond, shares = ~is_calibrated(posterior.model, mode, grid), np.zeros(len(grid))
     if is_beyond.any():
         without = _bands(posterior, mode, grid[is_beyond], channel, True, errs_beyond=False, **options)[False]
         beyond = Band(*(column[is_beyond] for column in vars(band).values()))
@@ -170,8 +169,8 @@ def _points(
         )
     if stretch is not None:
         return checked_points(mode, stretch)
-    ends = range_of(posterior, mode)
-    if ends is not None:
+    if len(mode.controls) == 1:
+        ends = measured_range(posterior.model.experiment, mode)
         return np.linspace(*(ends if data is None else _beside(ends, mode, data.stretch)), points)
     measured = [test.stretch for test in posterior.model.experiment.tests if test.mode == mode]
     if data is None and not measured:
@@ -228,9 +227,9 @@ def _prediction_warnings(
             "the run was fitted to these measurements: their prediction checks the fit and says nothing about "
             "other data."
         )
-    outside_counts = [(int((~is_calibrated(model.experiment, mode, points)).sum()), len(points), "points")]
+    outside_counts = [(int((~is_calibrated(model, mode, points)).sum()), len(points), "points")]
     if data is not None:
-        is_inside = is_calibrated(model.experiment, mode, data.stretch)
+        is_inside = is_calibrated(model, mode, data.stretch)
         outside_counts.append((int((~is_inside).sum()), len(data), "measurements"))
     outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
@@ -247,12 +246,14 @@ def _prediction_warnings(
 
 
 def _calibrated_in_words(posterior: Posterior, mode: LoadingMode) -> str:
-    """Return up to where both invariants were measured."""
+    """Return up to which states was measured."""
     if ends := range_of(posterior, mode):
         low, high = ends
         return f"in mode {mode.name} the run is calibrated from {low:.4g} to {high:.4g} ({mode.controls[0].name})"
-    I1, I2 = largest_invariants(posterior.model.experiment.states)
-    return f"the run is calibrated up to I1 - 3 = {I1:.3g} and I2 - 3 = {I2:.3g}"
+    states = measured_states(posterior.model)
+    stretches = [f"of {(1 + low) ** 0.5:.4g} to {(1 + high) ** 0.5:.4g}" for low, high in states.strains]
+    along_axes = "".join(f", stretch {ends} along axis {axis}" for axis, ends in enumerate(stretches, 1))
+    return f"the run is calibrated up to I1 - 3 = {states.I1:.3g} and I2 - 3 = {states.I2:.3g}{along_axes}"
 
 
 def run_prediction(

@@ -106,14 +106,14 @@ class Prediction:
 
     @cached_property
     def is_calibrated(self) -> NDArray[np.bool_]:
-        """At which points (g,) the invariants stay in the range that was measured."""
-        return is_calibrated(self.posterior.model.experiment, self.mode, self.points)
+        """At which points (g,) the state is among those that were measured."""
+        return is_calibrated(self.posterior.model, self.mode, self.points)
 
     @property
     def is_data_calibrated(self) -> NDArray[np.bool_]:
         """Of which measurements (n,) that is true."""
         assert self.data is not None  # noqa: S101 (requested only if there are measurements)
-        return is_calibrated(self.posterior.model.experiment, self.mode, self.data.stretch)
+        return is_calibrated(self.posterior.model, self.mode, self.data.stretch)
 
     @property
     def calibrated_range(self) -> tuple[float, float] | None:
@@ -248,8 +248,8 @@ class Prediction:
 
 
 def range_of(posterior: Posterior, mode: LoadingMode) -> tuple[float, float] | None:
-    """Return the ends of the range in which both invariants were measured, where a mode has one control."""
-    return calibrated_range(posterior.model.experiment, mode) if len(mode.controls) == 1 else None
+    """Return the stretches up to which states were measured, where a mode has one control."""
+    return calibrated_range(posterior.model, mode) if len(mode.controls) == 1 else None
 
 
 def draw_prediction(axes: Sequence[Axes], prediction: Prediction) -> None:

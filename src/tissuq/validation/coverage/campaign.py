@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.assessment import Average
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.mechanics.invariants import farthest_stretch, largest_invariants
+from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.stream import Campaign
 from tissuq.validation.coverage.fitted import fit_all
@@ -68,8 +68,8 @@ def stress_unseen(
 
 def unseen_stretches(measured: LoadingMode, stretch: FloatArray, mode: LoadingMode) -> FloatArray:
     """Return stretches above one in a mode, up to where I1 or I2 leaves the range that was measured in another."""
-    largest = largest_invariants(measured.at(stretch))
-    return np.linspace(1.0, farthest_stretch(mode, largest, 1), POINTS + 1)[1:]
+    states = MeasuredStates.of(measured.at(stretch))
+    return np.linspace(1.0, farthest_stretch(mode, states, 1), POINTS + 1)[1:]
 
 
 @dataclass(frozen=True)
