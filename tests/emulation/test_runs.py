@@ -216,3 +216,44 @@ def test_of_several_models_the_one_that_fails_is_named_and_each_gets_its_control
     failing = SeveralModels(((("force",), as_forward(locks)),))
     with pytest.raises(ConvergenceError, match=r"test_runs\.locks: the solver gave up"):
         failing.run({"a": 1.0}, controls)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_after_first_runs_that_all_fail_no_more_are_made(tmp_path, workers):
+    file = tmp_path / "broken.py"
+    file.write_text("def force(parameters):\n    raise RuntimeError('no licence')\n")
+    told = []
+    with pytest.raises(InputError, match=r"the first 4 runs of the forward model all failed.*no licence"):
+        tq.calibrate(
+            DEPTH, neo_hooke({"C10": 1.0}), FileForward(f"{file}:force"), PRIORS, runs=16, workers=workers,
+            folder=tmp_path / "runs", step=lambda label, is_new: told.append(label),
+        )  # fmt: skip
+    assert sorted(told) == [f"run {number}" for number in (1, 2, 3, 4)]
+    (tmp_path / "mended.py").write_text("def force(parameters, depth):\n    return parameters['C10'] * depth\n")
+    with runs_of(FileForward(f"{tmp_path / 'mended.py'}:force"), PROBLEM, tmp_path / "runs", 1, silent) as run:
+        assert not run(POINTS).failed.any()  # a folder of failed runs alone is free for another model
+
+
+def test_outputs_of_the_opposite_sign_are_refused_after_the_first_runs(tmp_path):
+    count = 0
+
+    def upside_down(parameters):
+        nonlocal count
+        count += 1
+        return {"pull": neo_hooke(parameters), "force": -neo_hooke(parameters)}
+
+    measured = dict.fromkeys(("pull", "force"), neo_hooke({"C10": 1.0}))
+    with pytest.raises(InputError, match=r"^force: the outputs .* opposite signs: -.*--factor"):
+        tq.calibrate(dict.fromkeys(measured, DEPTH), measured, upside_down, PRIORS, runs=16, folder=tmp_path / "runs")
+    assert count == 4
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_kept_run_is_told_of_once(tmp_path):
+    told = []
+    for _ in range(2):
+        tq.calibrate(
+            DEPTH, neo_hooke({"C10": 1.0}) + 0.01 * np.sin(40 * DEPTH), lambda p, depth: neo_hooke(p), PRIORS,
+            noise_sd=0.01, runs=8, folder=tmp_path / "runs", step=lambda *result: told.append(result),
+        )  # fmt: skip
+    assert told == [(f"run {number}", is_new) for is_new in (True, False) for number in range(1, 9)]

@@ -107,6 +107,20 @@ def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
     assert inspected(stretch, stress, cycle="last", branch="loading").warnings == ()
 
 
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_a_protocol_of_several_ratios_is_no_repetition(tmp_path, repeats):
+    ratios = np.repeat([(1, 1), (1, 0.5), (0.5, 1)], repeats, axis=0)
+    strains = np.concatenate([np.outer(np.linspace(0, 0.2, 15), ratio) for ratio in ratios])
+    first, second = 1 + strains.T
+    third = 1 / (first * second)
+    stress = [2 * (along - third**2 / along) for along in (first, second)]
+    rows = "".join(",".join(map(repr, map(float, row))) + "\n" for row in zip(first, second, *stress, strict=True))
+    (tmp_path / "sheet.csv").write_text(f"stretch x,stretch y,stress x (kPa),stress y (kPa)\n{rows}")
+    warnings = tq.inspect(tmp_path / "sheet.csv").warnings
+    assert "--cycle last" not in " ".join(warnings)
+    assert any("all 6 cycles are used, which have 3 ratios" in text for text in warnings) is (repeats == 2)
+
+
 def test_a_table_in_any_order_is_not_taken_for_cycles(inspected):
     stretch, stress = curve(rows=30)
     order = np.random.default_rng(5).permutation(30)

@@ -17,7 +17,16 @@ from tissuq.emulation.prior_correlation import PriorCorrelation
 from tissuq.errors import InputError
 from tissuq.parameters.priors import Prior
 
-__all__ = ["EmulatorCheck", "ForwardRun", "ForwardRuns", "PointSet", "carry_out", "gathered", "space_filling"]
+__all__ = [
+    "EmulatorCheck",
+    "ForwardRun",
+    "ForwardRuns",
+    "PointSet",
+    "carry_out",
+    "check_first_runs",
+    "gathered",
+    "space_filling",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -198,6 +207,13 @@ class ForwardRuns:
         """Parameters and outputs of the runs that did not fail."""
         return self.points[~self.failed], self.outputs[~self.failed]
 
+    @property
+    def failure_reason(self) -> str:
+        """The most frequent reason of failed runs, in words."""
+        reasons = [error for error in self.errors if error]
+        most_frequent = max(set(reasons), key=reasons.count)
+        return f"{'The reason' if len(set(reasons)) == 1 else 'The most frequent reason'}: {most_frequent}."
+
     def joined(self, new_runs: ForwardRuns) -> ForwardRuns:
         """Return these runs followed by others of the same model."""
         return ForwardRuns(
@@ -213,12 +229,9 @@ class ForwardRuns:
         """The number, the region and the most frequent reason of failed runs, in words; empty where none failed."""
         if not self.failed.any():
             return ""
-        reasons = [error for error in self.errors if error]
-        most_frequent = max(set(reasons), key=reasons.count)
-        which = "The reason" if len(set(reasons)) == 1 else "The most frequent reason"
         return (
-            f"{len(reasons)} of {len(self)} runs of the forward model failed, {self._failure_region()}. {which}: "
-            f"{most_frequent}."
+            f"{self.failed.sum()} of {len(self)} runs of the forward model failed, {self._failure_region()}. "
+            f"{self.failure_reason}"
         )
 
     def _failure_region(self) -> str:
@@ -253,6 +266,46 @@ def gathered(symbols: Sequence[str], results: Sequence[Mapping[str, Any]], outpu
         tuple(result["error"] for result in results),
         np.array([result["seconds"] for result in results]),
     )
+
+
+FIRST_RUNS = 4
+"""Number of runs after which it is asked whether further ones can be of use."""
+MAX_OPPOSITE_COSINE = -0.9
+"""Largest cosine between outputs and measurements of which only the sign differs."""
+
+
+def check_first_runs(runs: ForwardRuns, measured: FloatArray, quantities: Mapping[str, tuple[int, int]]) -> None:
+    """Refuse to go on when the first runs all failed, or all gave a quantity with the opposite sign.
+
+    Parameters
+    ----------
+    runs : ForwardRuns
+    measured : (n,) array
+        What the outputs are compared with.
+    quantities : mapping of str to (int, int)
+        Where the measurements of each quantity begin and end.
+
+    Raises
+    ------
+    InputError
+        When that is so.
+    """
+    if runs.failed.all():
+        raise InputError(
+            f"the first {len(runs)} runs of the forward model all failed, and no more were made. {runs.failure_reason} "
+            "Mend the model or the options, or give other priors, and call it again."
+        )
+    _, outputs = runs.good
+    for name, (start, stop) in quantities.items():
+        values, computed = measured[start:stop], outputs[:, start:stop]
+        sizes = np.linalg.norm(values) * np.linalg.norm(computed, axis=1)
+        if (computed @ values < MAX_OPPOSITE_COSINE * sizes).all():
+            end = int(np.abs(values).argmax())
+            raise InputError(
+                f"{f'{name}: ' if name else ''}the outputs of the model and the measurements have opposite signs: "
+                f"{computed[0, end]:.4g} was computed where {values[end]:.4g} was measured. Turn the sign of one of "
+                "them; of a model in a deck, that of --factor."
+            )
 
 
 NORMAL_QUANTILE_975 = 1.959963984540054

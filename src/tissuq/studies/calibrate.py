@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, fields
-from itertools import count
+from functools import partial
+from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,7 +23,7 @@ from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.forward import Forward, as_forward
 from tissuq.emulation.problem import Problem, pose
-from tissuq.emulation.runs import ForwardRun, ForwardRuns, carry_out, gathered
+from tissuq.emulation.runs import FIRST_RUNS, ForwardRun, ForwardRuns, carry_out, check_first_runs, gathered
 from tissuq.errors import InputError
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.parameters.priors import Prior
@@ -169,7 +170,7 @@ def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers
         if folder is not None:
             _open(runs_folder, model, problem)
         try:
-            yield _Runs(model.prepared_in(runs_folder), problem, runs_folder, pool, step)
+            yield _Runs(model.prepared_in(runs_folder), problem, runs_folder, pool, step, max(FIRST_RUNS, workers))
         except BaseException:
             _remove_if_fruitless(runs_folder, missing)
             raise
@@ -177,13 +178,14 @@ def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers
 
 @dataclass(frozen=True)
 class _Runs:
-    """Batches of runs, each in a folder of its own."""
+    """Batches of runs, each in a folder of its own; the first begins with so many that are looked at by themselves."""
 
     model: Forward
     problem: Problem
     folder: Path
     pool: Executor | None
     step: Step
+    first: int
     batches: Iterator[int] = field(default_factory=count)
     numbers: Iterator[int] = field(default_factory=lambda: count(1))
 
@@ -194,10 +196,28 @@ class _Runs:
             ForwardRun(self.model, tuple(zip(symbols, point.tolist(), strict=True)), control, next(self.numbers))
             for point in points
         ]
-        batch_folder = self.folder / f"batch-{next(self.batches)}"
+        batch = next(self.batches)
+        batch_folder = self.folder / f"batch-{batch}"
         batch_folder.mkdir(exist_ok=True)
         _forget_failures(batch_folder / RESULTS)
-        results = run_tasks(tasks, carry_out, batch_folder, pool=self.pool, step=self.step)
+        run = partial(run_tasks, carry_out=carry_out, folder=batch_folder, pool=self.pool)
+        first = [] if batch else tasks[: self.first]
+        if first:
+            results = run(first, step=self.step, others_stay=True)
+            first_runs = gathered(symbols, results, len(control))
+            try:
+                check_first_runs(first_runs, self.problem.measured, self.problem.quantities)
+            except InputError:
+                if not first_runs.failed.all():  # what the solver wrote of failed runs is to be looked at
+                    (batch_folder / RESULTS).unlink()
+                raise
+        reported = {task.label for task in first}
+
+        def step(label: str, is_new: bool) -> None:
+            if label not in reported:
+                self.step(label, is_new)
+
+        results = run(tasks, step=step)
         return gathered(symbols, results, len(control))
 
 
@@ -214,13 +234,15 @@ def _open(folder: Path, model: Forward, problem: Problem) -> None:
             recorded = json.loads(file.read_text(encoding="utf-8"))
         except ValueError as error:
             raise InputError(f"'{file}' is damaged: choose another folder for the runs.") from error
-        for name, value in about.items():
-            if recorded.get(name) != value:
-                raise InputError(
-                    f"folder '{folder}' holds runs of another forward model or data (its {name} differ): choose "
-                    "another one, or remove it."
-                )
-        return
+        different = [name for name, value in about.items() if recorded.get(name) != value]
+        if not different:
+            return
+        if not _have_all_failed(folder):
+            raise InputError(
+                f"folder '{folder}' holds runs of another forward model or data (its {different[0]} differ): choose "
+                "another one, or remove it."
+            )
+        shutil.rmtree(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"'{folder}' is not a folder of forward runs; choose another one.")
     folder.mkdir(parents=True, exist_ok=True)
@@ -245,6 +267,11 @@ def _forget_failures(results: Path) -> None:
         return
     successes = [line for line in results.read_bytes().splitlines(keepends=True) if not _has_failed(line)]
     results.write_bytes(b"".join(successes))
+
+
+def _have_all_failed(folder: Path) -> bool:
+    results = [path.read_bytes().splitlines() for path in folder.glob(f"batch-*/{RESULTS}")]
+    return any(results) and all(map(_has_failed, chain(*results)))
 
 
 def _has_failed(line: bytes) -> bool:

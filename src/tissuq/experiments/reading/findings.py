@@ -31,6 +31,8 @@ NEGLIGIBLE_STRESS = 0.01
 """Share of the largest stress that is none."""
 PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
+SAME_RATIO = np.radians(5.0)
+"""Angle between the strains of two axes within which cycles have the same ratio of them."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
 STRESS_AT_REST = "the stress is already"
@@ -67,12 +69,24 @@ def _stretch_size(reading: Reading, number: int) -> str:
 
 
 def _cycles(reading: Reading, number: int) -> str:
-    count = len(reading.used_cycles)
-    if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count:
+    count, ratios = len(reading.used_cycles), _ratios(reading)
+    if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count or ratios == count:
         return ""
+    if ratios > 1:
+        return (
+            f"all {count} cycles are used, which have {ratios} ratios of strains between them: to leave out the first "
+            "of those with the same ratio, give --leave-out with their lines."
+        )
     numbered = advice_on_numbered_tests(reading.table, reading.choices, reading.recorded.course)
     advice = "; ".join(filter(None, ("to fit one, give --cycle last, first or a number", numbered)))
     return f"all {count} cycles are used; {advice}."
+
+
+def _ratios(reading: Reading) -> int:
+    """Return how many ratios of the strains of its axes the cycles of a test turn at: several are a protocol."""
+    strains = reading.used.stretch[:, [cycle.peak for cycle in reading.used_cycles]] - 1
+    angles = np.sort(np.arctan2(*strains)) if len(strains) == 2 else np.zeros(1)
+    return 1 + int(np.count_nonzero(np.diff(angles) > SAME_RATIO))
 
 
 def _hysteresis(reading: Reading, number: int) -> str:
