@@ -89,6 +89,21 @@ def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
     assert sum(float(row["low"]) < float(row["measured"]) < float(row["high"]) for row in band) >= 10
 
 
+def test_lines_are_left_out_as_the_message_says(calibrate_run, tmp_path):
+    folder, _ = calibrate_run
+    write_all(tmp_path)
+    heading, *rows = (tmp_path / "punch.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "punch.csv").write_text("".join([heading, *rows[:3], "0.2,slipped\n", *rows[3:]]))
+    options = [*USUAL, "--discrepancy", "gp-pinned", "--no-figures", "--out", "run"]
+    arguments = ["calibrate", "punch.csv", "--forward", "force.py:force", *options]
+    refused = run_in(tmp_path, *arguments)
+    assert refused.status == 2
+    assert "--leave-out 5 " in refused.err
+    said = run_in(tmp_path, *arguments, "--leave-out", 5)
+    assert said.status == 0, said.err
+    assert (tmp_path / "run" / "summary.csv").read_bytes() == (folder / "run" / "summary.csv").read_bytes()
+
+
 @pytest.mark.slow
 def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate_run):
     folder, _ = calibrate_run

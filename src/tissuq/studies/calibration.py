@@ -17,7 +17,7 @@ from tissuq.emulation.problem import symbol_of
 from tissuq.errors import InputError
 from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.headings import heading, plain
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
@@ -156,7 +156,7 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
 
 def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measured], list[OfModel]]:
     """Return what was measured, by quantity, and what of it each file has; rows count where there is a value."""
-    tables = [read_table(folder / file, settings.skip_rows, settings.sheet) for file in settings.files]
+    tables = [_table(folder / file, settings) for file in settings.files]
     experiments = _experiments(settings, tables)
     if settings.measured_names == ("",):
         columns = _places(tables[0], (settings.control, settings.measured))
@@ -172,6 +172,16 @@ def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measur
             for name, place in places.items()
         }
     return data, experiments
+
+
+def _table(path: Path, settings: CalibrationSettings) -> Table:
+    table = read_table(path, settings.skip_rows, settings.sheet)
+    if settings.leave_out is None:
+        return table
+    remaining = np.flatnonzero(~rows_in(settings.leave_out, table.lines, table.file))
+    if not len(remaining):
+        raise InputError(f"{table.file}: no row is left but those of --leave-out {settings.leave_out}.")
+    return table.taken(remaining)
 
 
 def _experiments(settings: CalibrationSettings, tables: Sequence[Table]) -> list[OfModel]:

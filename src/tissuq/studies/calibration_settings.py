@@ -138,6 +138,7 @@ class CalibrationSettings(ModelSettings):
     )
     range: str | None = option(None, "With --material: smallest and largest stretch, such as 0.7:1.3.")
     mode: str = option("uniaxial", "With --material: loading mode of the range.")
+    leave_out: str | None = option(None, "Lines of the file to leave out, such as 31,45:50.")
     every: int = option(1, "Use only every N-th row.", ge=1)
     sheet: str | int | None = option(None, "Sheet of an Excel workbook, by name or number.", parse=column)
     skip_rows: int = option(0, "Lines to skip at the top of the file.", ge=0)
