@@ -26,13 +26,13 @@ demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain 
 	@echo "  the paper's study:  $(abspath $(RUNS))/paper/report.html"
 	@echo "  human brain cortex: $(abspath $(RUNS))/brain/report.html"
 
-test: $(VENV)/.installed-dev  ## Run the quick tests (seven to fifteen minutes on two cores the first time)
+test: $(VENV)/.installed-dev  ## Run the quick tests (five minutes on two cores)
 	$(PYTEST) -m 'not ($(LONG))'
 
 test-rest: $(VENV)/.installed-dev  ## Run the tests that `make test` leaves out
 	$(PYTEST) -m '$(LONG)'
 
-test-all: $(VENV)/.installed-dev  ## Run every test, with coverage (half an hour on two cores)
+test-all: $(VENV)/.installed-dev  ## Run every test, with coverage (forty minutes on two cores)
 	$(PYTEST) --cov=src/tissuq --cov-report=term:skip-covered
 
 mutants: $(VENV)/.installed-dev  ## Plant faults in copies of the source and see that tests catch each (ten minutes)

@@ -21,7 +21,16 @@ os.environ.setdefault("TISSUQ_PROGRESS", "off")  # lines that depend on how fast
 MEMORY_MAPS, MOST_MAPS = Path("/proc/self/maps"), 20_000
 """What a process has mapped (on Linux, where 65530 are allowed), and from how many on compiled functions are let go."""
 
+SLOW_EXAMPLES = {"fit_population", "patient", "sample_nuts", "sample_smc"}
+"""Functions and classes whose examples take more than a few seconds."""
+
 gc.disable()  # until all is collected: what is imported stays, and searching it ever again takes a quarter of the time
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Leave the slow examples out of the quick tests."""
+    if isinstance(item, pytest.DoctestItem) and item.name.rpartition(".")[2] in SLOW_EXAMPLES:
+        item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish() -> None:

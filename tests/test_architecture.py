@@ -43,6 +43,7 @@ def test_a_stage_imports_only_stages_to_its_left(file):
     assert not imports_of(file) & set(later)
 
 
+@pytest.mark.slow
 def test_the_page_of_the_architecture_lists_the_files_as_they_are():
     table = runpy.run_path(str(ROOT.parents[1] / "docs" / "architecture_table.py"))
     text = table["PAGE"].read_text(encoding="utf-8")
@@ -62,6 +63,7 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
         assert not names & {node.id for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Name)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "document",
     [
@@ -105,6 +107,7 @@ def test_importing_the_package_imports_none_of_it_before_it_is_used():
     assert said.strip() == "[] True False"
 
 
+@pytest.mark.slow
 def test_variants_are_listed_before_anything_else_of_the_package_is_used():
     listings = ("tissuq.materials()", "tissuq.discrepancies()", "tissuq.loading_modes()")
     for listing in listings:

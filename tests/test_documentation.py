@@ -37,6 +37,7 @@ def listed_commands(*words):
     return re.findall(r"^  ([a-z]\S*)", commands, flags=re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_every_command_that_help_lists_has_a_page():
     pages = generated.command_pages()
     names = [name for name in listed_commands() if name != "study"] + [f"study {n}" for n in listed_commands("study")]

@@ -86,6 +86,7 @@ def test_refining_changes_nothing_within_the_stated_accuracy(formulation, data):
     assert_agree(answer(formulation, data), answer(formulation, data, refine))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_a_few_nodes_more_or_less_change_nothing_within_the_stated_accuracy(formulation):
     # the short version: where four fifths of the nodes in each dimension are enough, so are all; they are not for
@@ -144,6 +145,7 @@ def test_evidence_is_the_gaussian_integral_where_the_bounds_are_far(formulation)
     assert answer(formulation, "thirty points").log_evidence == pytest.approx(exact, abs=1e-4, rel=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("data", ["thirty points", "C10 pushed to 0"])
 def test_constant_agrees_with_a_plain_uniform_grid_over_its_three_parameters(data):
     stretch, stress = DATA[data]
@@ -165,6 +167,7 @@ def test_constant_agrees_with_a_plain_uniform_grid_over_its_three_parameters(dat
     assert found.means["S"] == pytest.approx(np.einsum("ijk,k->", weight, s), abs=5e-3 * found.sds["S"])
 
 
+@pytest.mark.slow
 def test_gp_evidence_agrees_with_scipy_densities_on_a_plain_grid():
     stretch, stress = DATA["six points"]
     x = oracle.stress_per_unit("C10", stretch)

@@ -82,6 +82,7 @@ def status_of(address, **headers):
         return error.code
 
 
+@pytest.mark.slow
 def test_a_file_that_is_dropped_is_read_and_shown(visit, tmp_path, write_stretches):
     page = visit()
     text = write_stretches(tmp_path).read_text()
@@ -289,6 +290,7 @@ def test_a_fit_that_is_cancelled_or_whose_page_is_closed_leaves_nothing(visit, s
     assert number_of(other)[1] < 10 < number_of(other)[2]
 
 
+@pytest.mark.slow
 def test_files_chosen_before_the_page_has_its_session_are_not_lost(browser, address, tmp_path):
     path = tmp_path / "first.csv"
     path.write_text("stretch,stress_kPa\n" + "".join(f"{1 + k / 50},{k}\n" for k in range(12)))

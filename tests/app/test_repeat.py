@@ -80,6 +80,7 @@ def test_false_is_written_as_its_own_switch():
     assert reading_words({"compression_positive": False, "until_peak": False}) == ["--tension-positive"]
 
 
+@pytest.mark.slow
 def test_a_fit_is_repeated_by_its_command_and_by_its_python(forms, here, write_stretches, monkeypatch):
     write_stretches(here)
     request = {

@@ -17,6 +17,7 @@ async def chunks(*parts):
         yield part
 
 
+@pytest.mark.slow
 @given(st.text(max_size=300))
 def test_every_name_becomes_one_of_a_file_in_the_folder(name):
     harmless = uploads.harmless_name(name)

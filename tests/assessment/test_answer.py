@@ -24,6 +24,7 @@ def yeoh(**options):
     return gallery.fit(tq.simulate("yeoh", YEOH, STRETCH, noise_sd=0.01, seed=1), noise_sd=0.01, **options)
 
 
+@pytest.mark.slow
 def test_the_numbers_are_the_modulus_and_the_headline_parameter_of_the_posterior():
     posterior = yeoh(discrepancy="auto")
     modulus, c10 = posterior.answer.estimates
@@ -79,6 +80,7 @@ def test_a_negative_modulus_is_never_fit_for_simulation():
     assert "unstable" in {warning.code for warning in posterior.warnings}
 
 
+@pytest.mark.slow
 def test_fibres_are_taken_into_finite_elements_with_care_and_not_with_a_free_energy():
     material, stretch = "neo-hookean+standard-fibres:one@0", np.linspace(1.02, 1.3, 12)
     data = tq.simulate(material, {"C10": 0.01, "k": 0.02}, stretch, noise_sd=1e-4, seed=2)
@@ -90,6 +92,7 @@ def test_fibres_are_taken_into_finite_elements_with_care_and_not_with_a_free_ene
     assert "energy discrepancy" in posterior.answer.uses[3].reason
 
 
+@pytest.mark.slow
 def test_what_is_implausible_in_the_measurements_comes_first():
     posterior = yeoh(discrepancy="auto")
     unit = ResultWarning("check the unit: MPa was assumed.", "doubtful-reading", Severity.PROBLEM)
@@ -110,6 +113,7 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     assert "design" in vague.answer.next_step.shell
 
 
+@pytest.mark.slow
 def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are_next():
     data = [tq.datasets.load(f"rubber-treloar-{mode}") for mode in ("uniaxial", "equibiaxial", "planar")]
     answer = tq.fit(data, discrepancy="auto-first").answer
@@ -119,6 +123,7 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
     assert "further specimens" in answer.next_step.shell
 
 
+@pytest.mark.slow
 def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
     assert answer.meaning == tq.estimands()["specimen"].description

@@ -54,6 +54,7 @@ def test_a_sampled_fit_without_evidence_is_compared_by_prediction(fits):
     assert table.loc["sampled", "elpd_difference"] > 10
 
 
+@pytest.mark.slow
 def test_a_fit_without_evidence_is_compared_by_prediction_with_one_of_the_same_data():
     sampled = gallery.sampled_jointly()
     exact = tq.fit(sampled.model.experiment, discrepancy="none", noise_sd=0.05)

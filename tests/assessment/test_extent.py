@@ -22,6 +22,7 @@ def unit(name):
     return tq.simulate(name, dict.fromkeys(TRUTH if name == "yeoh" else ("C10", "C01"), 0.0) | {"C10": 1.0}, STRETCH)
 
 
+@pytest.mark.slow
 def test_the_share_of_the_stress_is_that_of_the_terms_that_the_material_lacks(data):
     exact = tq.simulate("yeoh", TRUTH, STRETCH).stress
     lacking = exact - unit("yeoh").stress

@@ -117,6 +117,7 @@ def test_a_shear_test_tells_stability_in_shear_and_in_the_modes_of_one_stretch()
     assert -low == pytest.approx(high)
 
 
+@pytest.mark.slow
 def test_an_energy_discrepancy_takes_part_and_its_share_is_that_of_its_draws():
     data = tq.simulate("neo-hookean", {"C10": 0.5}, np.linspace(0.8, 1.3, 12), noise_sd=0.05, seed=3)
     posterior = tq.fit(data, discrepancy="auto", noise_sd=0.05)
@@ -141,6 +142,7 @@ def test_ogdens_law_loses_stability_where_its_own_tangent_does():
     assert found.rising[stretch > 2.75].max() == 0
 
 
+@pytest.mark.slow
 def test_a_material_in_jax_is_as_stable_as_the_same_in_plain_arithmetic():
     from jax import numpy as jnp
 

@@ -82,6 +82,7 @@ def test_nothing_changes_where_everything_is_stable():
     assert stable.warnings == other.warnings
 
 
+@pytest.mark.slow
 def test_a_negative_modulus_is_left_out_and_the_data_are_said_to_contradict():
     data = tq.datasets.load("rubber-treloar-uniaxial")
     posterior = tq.fit(
@@ -96,6 +97,7 @@ def test_a_negative_modulus_is_left_out_and_the_data_are_said_to_contradict():
     assert posterior.data.attrs["stable_in"] == "uniaxial, planar"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("discrepancy", "low", "high"),
     [("taylor", 0.98, 1.0), pytest.param("auto", 0.7, 0.95, marks=pytest.mark.slow)],

@@ -128,6 +128,7 @@ def test_answers_are_the_options_of_a_message():
         options_in("--length '20")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are of Unix")
 def test_questions_are_answered_in_a_terminal(negative):
     import pty

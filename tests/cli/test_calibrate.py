@@ -89,6 +89,7 @@ def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
     assert sum(float(row["low"]) < float(row["measured"]) < float(row["high"]) for row in band) >= 10
 
 
+@pytest.mark.slow
 def test_lines_are_left_out_as_the_message_says(calibrate_run, tmp_path):
     folder, _ = calibrate_run
     write_all(tmp_path)
@@ -163,6 +164,7 @@ def force(parameters, depth):
 """
 
 
+@pytest.mark.slow
 def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(tmp_path):
     (tmp_path / "cube.py").write_text(PUNCH)
     depth = np.linspace(0.05, 0.3, 7)  # as many, and the prior, as in other tests, for whose shapes all is compiled

@@ -60,6 +60,7 @@ def words(material=MATERIAL, replaced="ELASTIC_FIBER_WALL", ends=ENDS, stretch="
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
 def test_fibres_of_a_deck_have_the_posterior_of_a_grid_and_go_on_to_cards(cli, here):
     measured = written(here)

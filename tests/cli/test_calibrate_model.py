@@ -45,6 +45,7 @@ def c10(folder: Path) -> tuple[float, float]:
     return rows["C10"]["mean"], rows["C10"]["sd"]
 
 
+@pytest.mark.slow
 def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, here, words):
     mean, sd = forces(here)
     said = cli(*words, *WIDE)
@@ -66,6 +67,7 @@ def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, he
     assert units["C10"] == "kPa"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("heading", "factor"), [("force (N)", 1e-3), ("force (uN)", 1e3)])
 def test_units_signs_and_symmetry_are_made_those_of_the_file(cli, here, words, heading, factor):
     mean, sd = forces(here)
@@ -77,6 +79,7 @@ def test_units_signs_and_symmetry_are_made_those_of_the_file(cli, here, words, h
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
 
 
+@pytest.mark.slow
 def test_several_quantities_of_a_deck_have_a_column_a_unit_and_a_noise_each(cli, here, words):
     """Least squares with weights; a quantity counts where there is a value of it."""
     forces(here)
@@ -121,6 +124,7 @@ def two_experiments(folder):
 TWO = ["--model", "pull.inp", "--replace", "OTHER", "--qoi", "pull=RF2@TOP"]
 
 
+@pytest.mark.slow
 def test_experiments_have_a_file_and_a_model_each(cli, here, words):
     """Least squares with weights; the file named first is that of the model named first."""
     mean, sd = two_experiments(here)
@@ -140,6 +144,7 @@ def test_experiments_have_a_file_and_a_model_each(cli, here, words):
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_files_that_several_models_need_are_copied_for_each_and_the_run_is_repeated(cli, here, words):
     """Of two decks one includes a mesh beside its folder; both get a file that none includes."""
     mean, sd = two_experiments(here)
@@ -175,6 +180,7 @@ def test_a_range_that_is_none_is_refused_before_anything_is_run(cli, here, words
     assert {path.name for path in here.iterdir()} == before
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
 def test_what_is_killed_in_a_second_model_keeps_the_run_of_the_first(cli, here, words):
     """Only the run of the solver that was going on is made again: 17 of two models at 8 points."""
@@ -222,6 +228,7 @@ def test_two_controls_of_one_of_several_files_are_refused(cli, here, words):
     assert started(here) == []
 
 
+@pytest.mark.slow
 def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
     mean, sd = forces(here)
     (here / "stiff").write_text("6.83")  # above which are 4 of 12 stratified runs: as many are left as in other tests
@@ -237,6 +244,7 @@ def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
 def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, words):
     forces(here)
@@ -257,6 +265,7 @@ def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, wor
     assert len(started(here)) - before <= 8 - 3
 
 
+@pytest.mark.slow
 def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
     """Normal prior and likelihood: precisions add up. The log-normal prior, 1 % wide, is nearly normal."""
     write_specimen(tmp_path / "specimen.csv")
@@ -282,6 +291,7 @@ def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
     assert "the posterior of the run fitted" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_run_is_repeated_from_its_own_folder_when_its_command_is_named(cli, here, words):
     forces(here)
     assert cli(*words, *WIDE).status == 0

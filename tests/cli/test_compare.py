@@ -38,6 +38,7 @@ def rows_of(folder):
         return {row["fit"]: row for row in csv.DictReader(file)}
 
 
+@pytest.mark.slow
 def test_runs_are_compared(cli, two_runs):
     said = cli("compare", "first", "second", "--out", "compared")
     assert said.status == 0, said.err
@@ -64,6 +65,7 @@ def test_runs_are_compared(cli, two_runs):
     }
 
 
+@pytest.mark.slow
 def test_a_comparison_is_never_overwritten_unasked(cli, two_runs, empty_figures):
     for options, status in (([], 0), ([], 2), (["--force"], 0)):
         said = cli("compare", "first", "--out", "compared", *options)
@@ -90,6 +92,7 @@ def test_a_file_that_is_no_posterior_is_refused(cli, here):
     assert "cannot be read" in said.err
 
 
+@pytest.mark.slow
 def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
     (two_runs / "other").mkdir()
     (two_runs / "first").rename(two_runs / "other" / "run")
@@ -100,6 +103,7 @@ def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
     assert len(rows_of(two_runs / "two")) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", slow_but(["nothing"], ["nothing", "[]", '[{"formulation": "auto"}]']))
 def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, empty_figures, text):
     (two_runs / "second" / "assessment.json").write_text(text)

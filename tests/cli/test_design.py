@@ -24,6 +24,7 @@ def rows_of(folder):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_tests_are_ranked_and_the_ranking_can_be_repeated(cli, run, here):
     said = cli("design", "run", *TESTS, "--target", "modulus", "--target", "planar:1.3")
     assert said.status == 0, said.err

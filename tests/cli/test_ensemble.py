@@ -14,6 +14,7 @@ from .conftest import write_specimen
 from .models import DECK, rows_of, started
 
 
+@pytest.mark.slow
 def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     said = cli("ensemble", *model, "--unit", "kPa")
     assert said.status == 0, said.err
@@ -37,6 +38,7 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert "HYPERELASTIC, NEO HOOKE" in page
 
 
+@pytest.mark.slow
 def test_the_next_test_is_for_a_quantity_of_the_model(cli, here, model):
     """The stub's force is C10: what a test tells of the one it tells of the other."""
     model[model.index("--draws") + 1] = 16
@@ -66,6 +68,7 @@ def test_a_quantity_that_no_ensemble_has_is_refused(cli, here, model, target, wo
     assert re.search(words, said.err)
 
 
+@pytest.mark.slow
 def test_an_ensemble_of_another_run_is_refused(cli, here, model):
     assert cli("ensemble", *model, "--no-figures").status == 0
     fit = "fit", write_specimen(here / "other.csv"), "--material", "yeoh", "--discrepancy", "none", "--no-figures"

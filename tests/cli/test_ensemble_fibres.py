@@ -41,6 +41,7 @@ def sheet(cli, here):
     return fit
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
 def test_calculix_pulls_a_cube_of_fibres_along_the_axes_of_the_deck(cli, here, sheet):
     sheet(MATERIAL)
@@ -58,6 +59,7 @@ def test_calculix_pulls_a_cube_of_fibres_along_the_axes_of_the_deck(cli, here, s
         assert abs(along / force - 1) > 0.1
 
 
+@pytest.mark.slow
 def test_a_deck_must_name_its_material_as_calculix_asks(cli, here, sheet):
     sheet(MATERIAL)
     (here / "cube.inp").write_text(DECK.replace("ELASTIC_FIBER_WALL", "Wall"))
@@ -75,6 +77,7 @@ def test_a_draw_of_fibres_is_chosen_for_a_finer_model(cli, here, sheet):
     assert said.status == 0, said.err
 
 
+@pytest.mark.slow
 def test_axes_of_a_material_of_febio_stay(cli, here, sheet):
     sheet("neo-hookean+exponential-fibres@30")
     axes = '<mat_axis type="vector"><a>0,1,0</a><d>1,0,0</d></mat_axis>'

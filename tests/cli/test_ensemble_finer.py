@@ -63,6 +63,7 @@ def test_the_band_is_that_for_elements_without_size_and_the_mesh_has_a_share(cli
     assert "the mesh is too coarse for it" in " ".join(said.err.split() + said.out.split())
 
 
+@pytest.mark.slow
 def test_it_can_be_added_goes_on_is_in_the_recipe_and_another_finer_model_costs_one_run(cli, here, meshed):
     assert cli("ensemble", *meshed, "--no-figures").status == 0
     assert "mesh_free_mean" not in rows_of(here / "out" / "quantities.csv")[0]

@@ -103,6 +103,7 @@ def test_files_of_one_name_are_refused(cli, here, model):
     assert cli("ensemble", *model, "--no-figures", "--qoi", "x=a/q.py:f", "--qoi", "y=a/q.py:f").status == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_absolute", [True, False])
 def test_a_file_outside_of_the_folder_of_the_model_is_used_only_if_named_and_not_mixed(cli, here, model, is_absolute):
     (here / "deck").mkdir()

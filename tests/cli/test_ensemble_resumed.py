@@ -65,6 +65,7 @@ def test_the_files_of_the_solver_go_where_they_are_not_kept(cli, here, model):
     assert len(started(here)) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
 def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, model):
     (here / "slow").write_text("0.5")

@@ -77,6 +77,7 @@ def test_the_data_are_written_in_the_unit_of_the_file(fit_run):
     np.testing.assert_allclose(np.array([line.split(",") for line in lines[1:]], float).T, [stretch, stress])
 
 
+@pytest.mark.slow
 def test_a_run_is_repeated_byte_for_byte_from_its_run_toml_after_the_users_file_is_gone(fit_run, tmp_path):
     folder, _ = fit_run
     moved = tmp_path / "moved"
@@ -281,6 +282,7 @@ def test_show_refuses_what_is_not_a_run_folder(cli, specimen, folder):
     assert reason in said.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["gp-orthogonal", "gp-scaled"])
 def test_an_estimate_of_the_best_fit_says_so_beside_its_numbers(cli, here, specimen, discrepancy):
     said = cli("fit", specimen, "--discrepancy", discrepancy, "--noise-sd", 1, "--no-figures")
@@ -360,6 +362,7 @@ def test_an_estimand_that_does_not_exist_is_refused(cli, here, specimen):
     assert not (here / "runs").exists()
 
 
+@pytest.mark.slow
 def test_the_page_and_the_terminal_say_that_errors_are_correlated(cli, here):
     points, score = np.linspace(0.8, 1.5, 60), np.random.default_rng(4).standard_normal(60)
     errors = np.convolve(score, 0.7 ** np.arange(8))[:60]

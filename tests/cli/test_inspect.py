@@ -71,6 +71,7 @@ def test_a_fit_says_what_is_strange_about_the_measurements(cli, here):
     assert "all 3 cycles are used; to fit one" in said.out
 
 
+@pytest.mark.slow
 def test_both_axes_of_a_biaxial_test_are_inspected_and_fitted_at_once(cli, here):
     file = biotester_protocols()
     options = [file.written(here), "--mode", "biaxial", "--thickness", "1.5 mm", "--branch", "loading"]
@@ -174,6 +175,7 @@ def liver_file(folder):
     (folder / "liver.txt").write_text("\n".join(lines) + "\n")
 
 
+@pytest.mark.slow
 def test_a_study_of_all_tests_in_a_file_is_written_and_fitted(cli, here):
     liver_file(here)
     said = cli("inspect", "liver.txt", "--write", "study.toml")
@@ -217,6 +219,7 @@ def test_tests_in_a_file_take_a_mode_and_a_specimen_each(cli, here):
     assert "--mode is given 4 times for 2 files with 3 tests" in said.err
 
 
+@pytest.mark.slow
 def test_specimens_beside_one_another_are_a_population(cli, here):
     stretch = np.linspace(1, 1.3, 12)
     header = "stretch,stress S1 [kPa],stress S2 [kPa],stress S3 [kPa]"

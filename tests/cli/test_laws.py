@@ -29,6 +29,7 @@ def law(here):
     return here / "law.py"
 
 
+@pytest.mark.slow
 def test_a_law_is_checked(cli, law):
     said = cli("check", "law.py:exponential")
     assert (said.status, said.err) == (0, "")
@@ -52,6 +53,7 @@ def test_a_law_is_fitted_as_that_of_the_library(cli, law, specimen):
     assert rows[0][:5] == rows[1][:5]  # the evidence also tells that mu of demiray is positive
 
 
+@pytest.mark.slow
 def test_a_law_is_fitted_recorded_and_repeated_with_its_name(cli, law, here, specimen):
     assert cli("fit", specimen, "--material", "law.py:exponential", *FIT, "--out", "own").status == 0
     recipe = tomllib.loads((here / "own" / "run.toml").read_text())

@@ -69,6 +69,7 @@ def test_an_rhat_that_is_not_a_number_is_null_in_json(cli, stuck, here, specimen
     assert cli("show", "runs/specimen").status == 0
 
 
+@pytest.mark.slow
 def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_results(
     cli, stuck, here, one_range, empty_posteriors
 ):

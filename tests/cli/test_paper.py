@@ -24,6 +24,7 @@ def rows_of(file):
         return list(csv.DictReader(lines))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["paper_run"], ["paper_run", "whole_paper_run"]))
 def test_a_run_leaves_the_promised_files(request, name):
     folder, _ = request.getfixturevalue(name)
@@ -195,6 +196,7 @@ def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_p
     assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
 
 
+@pytest.mark.slow
 def test_replicates_count_how_often_each_claim_holds(cli, here, one_range, empty_posteriors):
     said = cli("paper", "--points", 6, "--replicates", 2, "--no-figures", "--out", "run")
     assert said.status == 0, said.err

@@ -14,6 +14,7 @@ def run(cli, here, specimen):
     return here / "run"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="needs Chromium")
 def test_a_report_is_printed_as_a_pdf(cli, here, run):
     said = cli("show", "run", "--pdf", "report.pdf")

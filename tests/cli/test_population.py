@@ -54,6 +54,7 @@ def table(file):
         return list(csv.DictReader(lines))
 
 
+@pytest.mark.slow
 def test_a_run_leaves_the_promised_files(population_run):
     folder, said = population_run
     found = {path.relative_to(folder / "run").as_posix() for path in (folder / "run").rglob("*") if path.is_file()}
@@ -75,6 +76,7 @@ def test_a_run_leaves_the_promised_files(population_run):
     assert "kPa" in page
 
 
+@pytest.mark.slow
 def test_show_prints_what_the_command_printed_and_details_all_else(population_run):
     folder, said = population_run
     assert run_in(folder, "show", "run").out == said.out
@@ -89,6 +91,7 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
     assert headline["unit"] == "kPa"
 
 
+@pytest.mark.slow
 def test_predictions_and_cards_start_from_a_new_patient(population_run):
     folder, _ = population_run
     row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
@@ -99,6 +102,7 @@ def test_predictions_and_cards_start_from_a_new_patient(population_run):
         assert said.status == 0, said.err
 
 
+@pytest.mark.slow
 def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_run, tmp_path):
     """The stub's force is the C10 that stands in the deck; that of a case is in proportion to C10."""
     pytest.importorskip("felupe", reason="FElupe is not installed")
@@ -126,6 +130,7 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     assert (tmp_path / "again" / "forces.csv").read_bytes() == (tmp_path / "bar" / "forces.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_specimens(population_run):
     folder, _ = population_run
     found = {row["quantity"]: {key: float(row[key]) for key in ("median", "hdi_low", "hdi_high")}
@@ -144,6 +149,7 @@ def test_the_numbers_are_those_of_the_specimens(population_run):
     assert float(bands[-1]["median [kPa]"]) == pytest.approx(stress, rel=0.5)
 
 
+@pytest.mark.slow
 def test_specimens_have_noises_of_their_own(here):
     write_all(here)
     noises = {f"S{k}": 0.5 * (k + 1) for k in range(5)}
@@ -245,6 +251,7 @@ def write_covariates(folder, rows=(), name="covariates.csv"):
     (folder / name).write_text("\n".join(lines) + "\n")
 
 
+@pytest.mark.slow
 def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     """The table lies among the specimens, of which it is none; a run is repeated with its copy."""
     write_all(here)

@@ -140,6 +140,7 @@ def test_the_earlier_run_is_put_back_when_the_new_one_cannot_take_its_place(cli,
     assert tree(here) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest_file", slow_but([150_000], [3_000, 150_000]))
 def test_a_file_system_that_stops_writing_ends_with_one_message_and_leaves_nothing(here, specimen, largest_file):
     before = tree(here)

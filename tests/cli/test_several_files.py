@@ -91,6 +91,7 @@ def test_a_run_of_several_files_repeats(cli, files, here):
     assert cli("show", "again").status == 0
 
 
+@pytest.mark.slow
 def test_tests_in_a_toml_file_have_their_own_options(cli, here):
     written(here, "uniaxial", "a.csv")
     (here / "b.csv").write_text("gamma;tau (Pa)\n0,1;9800\n0,2;20100\n0,3;29900\n0,4;40000\n")
@@ -167,6 +168,7 @@ def test_settings_that_contradict_each_other_are_refused(cli, here, text, words)
     assert words in " ".join(said.err.split())
 
 
+@pytest.mark.slow
 def test_each_file_is_read_once_and_each_note_is_printed_once(cli, here, monkeypatch):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()

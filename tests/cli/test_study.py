@@ -25,6 +25,7 @@ def test_the_help_names_every_preset(cli):
     assert all(name in said for name in (*PRESETS, "sbc"))
 
 
+@pytest.mark.slow
 def test_the_settings_in_a_campaigns_folder_repeat_it(cli, here):
     (here / "small.toml").write_text(CAMPAIGN + "scale = [0.01, 10.0]\npredictive = true\nunseen = ['planar']\n")
     assert cli("study", "coverage", "--config", "small.toml").status == 0
@@ -34,6 +35,7 @@ def test_the_settings_in_a_campaigns_folder_repeat_it(cli, here):
         assert (first / name).read_bytes() == (here / "again" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
     (here / "quick.toml").write_text('formulations = ["none", "zero-modulus"]\nreplicates = 20\n')
     arguments = ("study", "sbc", "--config", "quick.toml", "--noise", "known", "--out", "out")
@@ -58,6 +60,7 @@ def test_the_time_left_is_told_in_minutes_or_hours(seconds, text):
     assert _left(seconds) == text
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_a_campaign_shows_progress_and_time_left_on_a_terminal(here):
     import pty
@@ -72,6 +75,7 @@ def test_a_campaign_shows_progress_and_time_left_on_a_terminal(here):
     assert "left, none" in shown
 
 
+@pytest.mark.slow
 def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, here):
     arguments = ("study", "tissues", "--dataset", "brain-cortex", "--formulation", "none", "--protocol", "tests")
     said = cli(*arguments, "--out", "out")

@@ -30,6 +30,7 @@ def rows_of(folder):
         return {row["law"]: row for row in csv.DictReader(lines)}
 
 
+@pytest.mark.slow
 def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
     said = cli("fit", specimen, *TWO, *ALONE, "--out", "two")
     assert said.status == 0, said.err
@@ -72,6 +73,7 @@ def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
     assert "has several laws: choose one of mooney-rivlin, neo-hookean" in asked.err
 
 
+@pytest.mark.slow
 def test_a_comparison_is_repeated_from_its_recipe(cli, here, specimen):
     assert cli("fit", specimen, *TWO, *ALONE, "--no-figures", "--out", "first").status == 0
     recipe = tomllib.loads((here / "first" / "run.toml").read_text())
@@ -83,6 +85,7 @@ def test_a_comparison_is_repeated_from_its_recipe(cli, here, specimen):
         assert row | {"seconds": ""} == again[name] | {"seconds": ""}
 
 
+@pytest.mark.slow
 def test_laws_that_are_divided_among_processes_are_written_alike(cli, here, specimen):
     for workers in (1, 2):
         said = cli("fit", specimen, *TWO, *ALONE, "--no-figures", "--workers", workers, "--out", str(workers))
@@ -104,6 +107,7 @@ def test_a_process_that_is_ended_from_outside_is_one_message(cli, here, specimen
     assert not (here / "runs" / "specimen").exists()
 
 
+@pytest.mark.slow
 def test_a_law_of_ones_own_takes_part(cli, here, specimen):
     (here / "law.py").write_text(LAW)
     said = cli("fit", specimen, "--material", "law.py:softening", "--material", "neo-hookean", *ALONE, "--no-figures")

@@ -55,6 +55,11 @@ def test_a_program_that_is_not_there_is_told_before_anything_runs():
         (CalculiXSolver, "print('Job finished')", ""),
         (CalculiXSolver, "print(1)", "did not finish"),
         (CalculiXSolver, "print(' *ERROR in e_c3d: nonpositive jacobian')", "in e_c3d: nonpositive jacobian"),
+        (
+            CalculiXSolver,
+            "print(' *ERROR in umat: a law of fibres\\n        needs one more constant.\\n\\n best residual')",
+            "in umat: a law of fibres needs one more constant.",
+        ),
         (FEBioSolver, "print('N O R M A L   T E R M I N A T I O N')", ""),
         (FEBioSolver, "print('E R R O R   T E R M I N A T I O N')", "without a normal termination"),
     ],
@@ -66,6 +71,7 @@ def test_how_a_run_ended(tmp_path, kind, code, problem):
     assert bool(outcome.lines) == bool(problem and "print" in code)
 
 
+@pytest.mark.slow
 def test_a_run_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path):
     child = "import time;time.sleep(2);open(chr(97),chr(119))"  # which leaves a file named "a"
     code = f"import subprocess,sys,time;subprocess.Popen([sys.executable,'-c','{child}']);"

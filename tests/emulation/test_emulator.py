@@ -17,12 +17,14 @@ def elsewhere(function, priors, count=200):
     return points, runs_at(function, list(priors), points).outputs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("prior", [Uniform(0.2, 5.0), LogUniform(0.01, 100.0)])
 def test_outputs_proportional_to_a_parameter_are_emulated_to_rounding(prior):
     emulator = emulate(designed(neo_hooke, {"C10": prior}, 8), DEPTH)
     assert emulator.check(*elsewhere(neo_hooke, {"C10": prior})).relative_error < 1e-12
 
 
+@pytest.mark.slow
 def test_a_force_and_its_logarithm_are_told_apart():
     emulator = emulate(designed(ogden, OGDEN, 16), DEPTH)
     found = emulator.check(*elsewhere(ogden, OGDEN))
@@ -118,6 +120,7 @@ def test_unknown_choices_are_refused():
         space_filling(OGDEN, 8, design="grid")
 
 
+@pytest.mark.slow
 def test_sensitivities_are_those_of_the_closed_form():
     """Of a + 2 b + 4 (b - 1/2) (c - 1/2): variances 3, 12 and 4 (of b and c together) of 19."""
     priors = {symbol: Uniform(0.0, 1.0) for symbol in "abc"}
@@ -130,6 +133,7 @@ def test_sensitivities_are_those_of_the_closed_form():
     np.testing.assert_allclose(found["total"] * 19, [3, 16, 4], atol=0.4)
 
 
+@pytest.mark.slow
 def test_sensitivities_follow_the_priors():
     def function(p):
         return (p["a"] + p["b"]) * DEPTH
@@ -139,6 +143,7 @@ def test_sensitivities_follow_the_priors():
     assert found.loc["b", "first"] == pytest.approx(0.25 / (0.25 + 1 / 12), abs=0.02)
 
 
+@pytest.mark.slow
 def test_eight_parameters_are_emulated_and_those_without_effect_are_seen():
     priors = {f"p{k}": Uniform(0.5, 1.5) for k in range(8)}
 

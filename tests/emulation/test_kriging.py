@@ -40,6 +40,7 @@ def case(kernel, seed=0, m=14):
     return model, values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kernel", ["squared-exponential", "matern-5/2"])
 def test_predictions_are_those_of_the_textbook(kernel):
     import jax
@@ -103,6 +104,7 @@ def test_the_slope_of_the_density_is_that_of_finite_differences(kernel, trend):
         assert of_parameter == pytest.approx((high - low) / 2e-5, rel=1e-5, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_setting_of_a_dense_grid_is_more_probable_than_the_mode(seed):
     points = np.random.default_rng(seed).random((12, 2))

@@ -24,6 +24,7 @@ def calibration() -> Calibration:
     return tq.calibrate(DEPTH, measured, force, priors, discrepancy="gp-pinned", noise_sd=0.05, runs=24)
 
 
+@pytest.mark.slow
 def test_it_predicts_the_stress_of_the_draws_in_any_mode(calibration):
     posterior = calibration.posterior_of("ogden-1", (0.7, 1.2), unit="kPa")
     mu, alpha = (calibration.posterior.draws[:, :, calibration.problem.symbols.index(s)].ravel()[:, None]
@@ -37,6 +38,7 @@ def test_it_predicts_the_stress_of_the_draws_in_any_mode(calibration):
             np.testing.assert_allclose(band[column].to_numpy().ravel(), expected, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_its_marginals_are_those_of_the_calibration_in_the_unit_of_stress(calibration):
     posterior = calibration.posterior_of("ogden-1", (0.7, 1.2), unit="kPa")
     for symbol, factor in (("mu1", 1e-3), ("alpha1", 1.0)):
@@ -47,6 +49,7 @@ def test_its_marginals_are_those_of_the_calibration_in_the_unit_of_stress(calibr
     assert not any("measured" in text for text in posterior.warnings)
 
 
+@pytest.mark.slow
 def test_it_is_saved_whole_and_goes_to_finite_elements(calibration, tmp_path):
     posterior = calibration.posterior_of("ogden-1", (0.7, 1.2), unit="kPa")
     posterior.save(tmp_path / "tissue.nc")
@@ -56,6 +59,7 @@ def test_it_is_saved_whole_and_goes_to_finite_elements(calibration, tmp_path):
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_what_was_not_calibrated_is_told(calibration):
     with pytest.raises(InputError, match=r"yeoh has the parameters C10, C20, C30, and .* without C10, C20, C30"):
         calibration.posterior_of("yeoh", (0.7, 1.2))

@@ -24,6 +24,7 @@ def measured(function, truth, noise, seed=0):
     return function(truth) + noise * np.random.default_rng(seed).standard_normal(len(DEPTH))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", slow_but(["none", "gp-pinned"], ["none", "gp", "gp-pinned"]))
 def test_the_density_is_that_of_a_gaussian_with_all_three_errors(discrepancy):
     data = measured(ogden, TRUTH, 0.02)
@@ -40,6 +41,7 @@ def test_the_density_is_that_of_a_gaussian_with_all_three_errors(discrepancy):
     assert likelihood.log_density(values[None])[0] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_proportional_model_gives_the_closed_form():
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)
     priors = {"C10": tq.Normal(1.0, 0.4)}
@@ -59,6 +61,7 @@ def test_a_proportional_model_gives_the_closed_form():
     np.testing.assert_allclose(band["high"] - band["low"], 2 * norm.ppf(0.975) * sd, rtol=0.06)
 
 
+@pytest.mark.slow
 def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     data = measured(ogden, TRUTH, 0.2)
     emulator = emulate(designed(ogden, OGDEN, 9), DEPTH)
@@ -79,6 +82,7 @@ def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     assert found.log_evidence == pytest.approx(np.log(weights.sum() * cell) + logs.max(), abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", slow_but(["gp"], ["gp", "gp-pinned"]))
 def test_a_process_beside_the_model_agrees_with_the_exact_posterior_on_a_dense_grid(discrepancy):
     """The grid computes the model itself, which is linear in mu; the emulator has 40 runs of it.
@@ -132,6 +136,7 @@ def test_importance_sampling_and_nuts_agree():
         assert other.rhat[symbol] < 1.01
 
 
+@pytest.mark.slow
 def test_the_discrepancy_is_conditioned_on_the_data():
     wrong = measured(lambda p: neo_hooke(p) * (1 + 3 * DEPTH**2), {"C10": 1.2}, 0.01)
     found = tq.calibrate(DEPTH, wrong, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, discrepancy="gp-pinned",
@@ -183,6 +188,7 @@ def test_further_runs_are_made_where_the_posterior_is_until_the_emulator_is_good
     np.testing.assert_array_equal(more.runs.points[:8], few.runs.points)
 
 
+@pytest.mark.slow
 def test_further_runs_keep_away_from_those_that_failed():
     """The measurements lie where the model fails; without a word of it the same points would be run again and again."""
     priors, depth = {"mu": tq.Uniform(0.1, 1.0), "b": tq.Uniform(0.5, 3.0)}, np.linspace(0.1, 1, 10)
@@ -202,6 +208,7 @@ def test_further_runs_keep_away_from_those_that_failed():
     assert len(np.unique(found.runs.points, axis=0)) == 16
 
 
+@pytest.mark.slow
 def test_a_likelihood_by_itself_is_computed_in_double_precision():
     code = """
 import numpy as np
@@ -224,6 +231,7 @@ print(found + 0.5 * apart @ np.linalg.solve(cov, apart) + 0.5 * np.linalg.slogde
     assert abs(float(found.stdout)) < 1e-6
 
 
+@pytest.mark.slow
 def test_the_search_does_not_end_where_the_emulator_knows_nothing():
     """The logarithm of b reaches far beyond the runs, where anything is possible: a decoy beside a narrow posterior."""
     priors = {"k": tq.Uniform(0.1, 4.0), "b": tq.Uniform(0.0, 2.0)}
@@ -238,6 +246,7 @@ def test_the_search_does_not_end_where_the_emulator_knows_nothing():
     assert abs(found.marginals["b"].mean - 0.8) < 0.1
 
 
+@pytest.mark.slow
 def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     data = measured(ogden, TRUTH, 0.001)
     poor = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.001, runs=7)
@@ -247,6 +256,7 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     assert any("reaches the end of the simulated range of C10 (upper)" in text for text in found.warnings)
 
 
+@pytest.mark.slow
 def test_measurements_that_no_parameters_give_are_told():
     """The model is proportional to C10: beyond the prior's end, or of another shape, nothing comes near."""
     priors = {"C10": tq.Uniform(0.2, 1.0)}
@@ -267,6 +277,7 @@ def test_measurements_that_no_parameters_give_are_told():
     assert not any(words in text for text in admitted.warnings)
 
 
+@pytest.mark.slow
 def test_the_table_of_runs_left_out_has_the_worst_first():
     found = tq.calibrate(DEPTH, measured(ogden, TRUTH, 0.05), ogden, OGDEN, noise_sd=0.05, runs=12)
     table, check = found.leave_one_out, found.check
@@ -278,6 +289,7 @@ def test_the_table_of_runs_left_out_has_the_worst_first():
     assert table[["mu", "alpha"]].iloc[0].tolist() == check.points[worst].tolist()
 
 
+@pytest.mark.slow
 def test_measurements_are_simulated_together():
     """The mean of all is as uncertain as a Gaussian process given the data says, at one value of every parameter."""
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)
@@ -294,6 +306,7 @@ def test_measurements_are_simulated_together():
     np.testing.assert_allclose(np.cov(drawn.T), cov, atol=5 * cov.max() * (2 / 4000) ** 0.5)
 
 
+@pytest.mark.slow
 def test_a_saved_calibration_is_read_by_xarray(tmp_path):
     import xarray as xr
 

@@ -29,6 +29,7 @@ def test_the_density_is_that_of_jointly_normal_scores():
         assert own + found.log_density((mu, alpha, b), np) == pytest.approx(joint, rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["importance", pytest.param("nuts", marks=pytest.mark.slow)])
 def test_where_the_data_say_nothing_the_posterior_is_the_prior(method):
     """Within four standard errors of 800 effective draws."""

@@ -167,6 +167,7 @@ def test_a_folder_without_any_run_does_not_stay(tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_runs(tmp_path):
     file = tmp_path / "cube.py"
     file.write_text("def force(parameters, depth):\n    return parameters['C10'] * depth\n")
@@ -177,6 +178,7 @@ def test_processes_give_the_same_runs(tmp_path):
     assert [json.loads(line)["parameters"]["C10"] for line in lines] == [1.0, 2.0, 3.0]
 
 
+@pytest.mark.slow
 def test_failed_runs_are_told_in_the_result():
     def fragile(parameters):
         if parameters["C10"] > 3.5:
@@ -218,6 +220,7 @@ def test_of_several_models_the_one_that_fails_is_named_and_each_gets_its_control
         failing.run({"a": 1.0}, controls)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_after_first_runs_that_all_fail_no_more_are_made(tmp_path, workers):
     file = tmp_path / "broken.py"
@@ -249,6 +252,7 @@ def test_outputs_of_the_opposite_sign_are_refused_after_the_first_runs(tmp_path)
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.slow
 def test_a_kept_run_is_told_of_once(tmp_path):
     told = []
     for _ in range(2):

@@ -25,6 +25,7 @@ def measured(function, truth, seed=0):
             for name, values in function(truth, CONTROL).items()}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_two_quantities_give_the_closed_form_together():
     data = measured(linear, {"k": 1.7, "m": 1.3})
     found = tq.calibrate(CONTROL, data, linear, PRIORS, noise_sd=NOISE, runs=10)
@@ -40,6 +41,7 @@ def test_two_quantities_give_the_closed_form_together():
     assert found.predictive_coverage() > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["none", "gp-pinned"])
 def test_each_has_noise_and_discrepancy_of_its_own(discrepancy):
     found = tq.calibrate(CONTROL, measured(linear, {"k": 1.7, "m": 1.3}), linear, PRIORS, discrepancy=discrepancy,
@@ -67,6 +69,7 @@ def test_each_has_noise_and_discrepancy_of_its_own(discrepancy):
     np.testing.assert_allclose(new.std(axis=0), np.sqrt(np.diag(spread)), rtol=0.05)
 
 
+@pytest.mark.slow
 def test_a_quantity_of_a_small_unit_is_emulated_as_well_as_the_other():
     def curved(parameters, control):
         k, m = parameters["k"], parameters["m"]

@@ -63,6 +63,7 @@ PRIORS = {"k": tq.Uniform(0.1, 4.0), "b": tq.Uniform(0.0, 2.0)}
 MEASURED = 1.5 * (DEPTH + 0.8 * DEPTH**2)
 
 
+@pytest.mark.slow
 def test_parameters_are_identified_through_the_server(address):
     noisy = MEASURED + 0.01 * np.random.default_rng(0).standard_normal(12)
     found = tq.calibrate(DEPTH, noisy, tq.UmbridgeForward(address, "spring"), PRIORS, noise_sd=0.01, runs=12)

@@ -118,6 +118,7 @@ def test_quantities_in_a_data_frame_are_read_with_their_units():
     assert tq.read(frame).has_measurements_of(tq.Experiment("uniaxial", STRETCH, STRESS, stress_unit="kPa"))
 
 
+@pytest.mark.slow
 def test_a_long_data_frame_is_taken_as_numbers_and_many_gaps_in_it_are_refused():
     values = np.random.default_rng(1).random((20_000, 3))
     frame = pd.DataFrame(values, columns=["time", "stretch", "stress"])

@@ -73,6 +73,7 @@ def test_holds_are_found_in_95_of_100_planted_cases():
     assert np.mean([bool(find_holds(*curve)) for curve in planted]) >= 0.95
 
 
+@pytest.mark.slow
 def test_clean_curves_raise_no_more_than_5_of_100_false_alarms():
     random = np.random.default_rng(3)
     curves = [returning(random, law) for law in list(LAWS) * 50]

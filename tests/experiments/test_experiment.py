@@ -78,6 +78,7 @@ def test_quantities_of_pint_are_taken_in_their_units():
     assert (shown.stress[0], shown.stress_unit) == (0.2, "kPa")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stretch_unit", "stress_unit"), [("mm", "kPa"), ("", "mm"), ("", "N")])
 def test_quantities_of_another_dimension_are_refused(stretch_unit, stress_unit):
     units = pytest.importorskip("pint").UnitRegistry()

@@ -142,6 +142,7 @@ def test_an_unknown_mode_is_answered_with_the_modes_there_are():
         loading_mode("uniaxal")
 
 
+@pytest.mark.slow
 def test_a_mode_defined_outside_the_package_is_found_by_its_name():
     class Squeeze(LoadingMode):
         name = "squeeze-for-a-test"

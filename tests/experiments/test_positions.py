@@ -77,6 +77,7 @@ def test_a_start_away_from_0_under_load_is_asked_about_with_every_answer(tmp_pat
     np.testing.assert_allclose(data.stretch, stretch, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize(

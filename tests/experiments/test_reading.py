@@ -434,6 +434,7 @@ def test_a_damaged_file_is_read_or_refused_but_never_breaks_the_program(tmp_path
                 assert "test.csv" in str(error)  # noqa: PT017
 
 
+@pytest.mark.slow
 def test_many_rows_are_read_at_once_and_not_one_by_one(tmp_path):
     """Ninety thousand further rows cost fewer than two calls of Python functions each: seconds for a million."""
     rows = "".join(f"{1 + i * 1e-6:.6f};{i * 1e-6:.6f}\n".replace(".", ",") for i in range(1000))

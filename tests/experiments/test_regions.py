@@ -26,6 +26,7 @@ def inspected(tmp_path):
     return inspect
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in PLANTED if name != "slack over a quarter"])
 def test_what_is_planted_is_found_in_95_of_100_tests(name):
     """Of 500 of each kind 95 to 100 % are found (`python tests/planted.py 250`): fewer than 52 of 60 by chance is
@@ -33,6 +34,7 @@ def test_what_is_planted_is_found_in_95_of_100_tests(name):
     assert rates(name, 60, 11, ALL_LAWS)[PLANTED[name][0]] >= 52
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLEAN)
 def test_clean_tests_raise_no_more_than_5_of_100_false_alarms_of_all_kinds_together(name):
     """Of 500 1 to 2 % raise one: more than 10 of 120 by chance is less likely than 1e-3 for 2 %."""
@@ -64,6 +66,7 @@ def test_a_saturated_load_cell_is_said_and_the_advice_leaves_its_rows_out(inspec
     assert len(inspection.reading.experiment) == 121 - count
 
 
+@pytest.mark.slow
 def test_noise_beside_a_saturated_load_cell_is_no_slip(inspected):
     """The equal loads hid the scatter of the others, so that 6 of 100 such tests seemed to slip; of 400 none does."""
     noise = np.random.default_rng(5)

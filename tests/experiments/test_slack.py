@@ -97,6 +97,7 @@ def found_slack(share, laws, count, noises, rows=(100, 201, 1000)):
         yield planting, find_slack(*planting.slack(share))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "noises"), [(0.1, (0, 1e-3)), (0.15, (1e-3, 3e-3)), (0.25, (1e-3, 1e-2))])
 def test_slack_is_found_in_95_of_100_planted_tests(share, noises):
     """Of 1200 99.5 to 100 % are found: fewer than 133 of 140 by chance is less likely than 1e-5."""
@@ -104,18 +105,21 @@ def test_slack_is_found_in_95_of_100_planted_tests(share, noises):
     assert np.mean(found) >= 0.95
 
 
+@pytest.mark.slow
 def test_slack_of_a_tenth_is_found_in_j_shaped_curves_where_noise_is_small():
     """Of 1200 99.8 % are found: fewer than 90 of 100 by chance is less likely than 1e-9."""
     found = [slack is not None for _, slack in found_slack(0.1, list(STIFFENING), 100, (0, 1e-3), rows=(201, 1000))]
     assert np.mean(found) >= 0.90
 
 
+@pytest.mark.slow
 def test_clean_curves_and_j_shaped_ones_raise_no_more_than_5_of_100_false_alarms():
     """Of 2400 2 % raise one (J-shaped ones 3 %): more than 5 % of 500 by chance is less likely than 1e-4."""
     curves = found_slack(0.0, [*LAWS, *STIFFENING], 500, (0, 1e-3, 3e-3, 1e-2, 2e-2), rows=(40, 100, 201, 1000))
     assert np.mean([slack is not None for _, slack in curves]) <= 0.05
 
 
+@pytest.mark.slow
 def test_its_standard_deviation_is_how_far_it_is_from_where_load_begins():
     """Within two standard deviations in 98 of 100 of 1134: fewer than 90 of 100 by chance is less likely than 1e-4."""
     tests = found_slack(0.2, [*LAWS, *STIFFENING], 120, (1e-3, 3e-3, 1e-2))

@@ -45,6 +45,7 @@ def test_few_places_have_their_means_and_the_slope_between():
     assert found.slope.tolist() == [4.0, 4.0, 4.0, 4.0]
 
 
+@pytest.mark.slow
 def test_thousands_of_places_are_smoothed_in_groups():
     place = np.linspace(0.6, 2.0, 30_000)
     noise = 0.05 * np.random.default_rng(3).standard_normal(len(place))

@@ -51,6 +51,7 @@ def test_calculix_computes_the_stress_of_the_draw(given, tmp_path, keyword, stif
     assert calculix(text, LOADS, tmp_path) == pytest.approx(wanted, rel=AGREEMENT), NAMES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", [pytest.param("MPa", marks=pytest.mark.finite_elements), "kPa"])
 def test_calculix_computes_the_stress_of_a_free_energy_to_the_error_that_is_stated(auto, tmp_path, unit):
     cards = card_format("calculix").cards(auto, CardSettings(unit=unit))

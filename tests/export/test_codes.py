@@ -150,6 +150,7 @@ def test_a_law_that_no_code_has_is_never_called_exact(given, code, name):
     assert "PROJECTION" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", CODES)
 def test_every_file_says_where_it_comes_from(auto, code):
     cards = card_format(code).cards(auto, CardSettings(source="run -- brain", unit="kPa", name="CORTEX"))
@@ -199,6 +200,7 @@ def test_a_draw_without_stiffness_has_no_bulk_modulus_by_poissons_ratio(given):
         ({"poisson": 0.5}, "between 0 and 0.5"),
         ({"order": 3}, "give the law"),
         ({"name": "my tissue"}, "cannot name a material"),
+        ({"name": "2nd"}, "a letter first"),
     ],
 )
 def test_settings_without_meaning_are_refused(settings, words):

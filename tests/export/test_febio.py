@@ -41,6 +41,7 @@ def test_febio_takes_a_card_of_every_type(given, kind):
     assert refusals(text) == []
 
 
+@pytest.mark.slow
 def test_febio_takes_the_mixture_of_a_free_energy(auto):
     text, _ = card(auto, law="mixture")
     assert 'type="uncoupled solid mixture"' in text

@@ -36,6 +36,7 @@ def principal_differences(energy, logs):
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", ["calculix", "febio"])
 def test_the_error_beyond_the_range_is_the_one_that_is_stated(auto, code):
     cards = card_format(code).cards(auto, CardSettings())

@@ -32,6 +32,7 @@ def stretches(low, high):
     return np.concatenate([1 + (end - 1) * np.arange(1, 31) / 30 for end in (low, high)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", READERS)
 def test_the_error_that_is_stated_is_the_error_of_the_numbers_in_the_card(auto, code):
     cards = card_format(code).cards(auto, CardSettings())
@@ -49,6 +50,7 @@ def test_the_error_that_is_stated_is_the_error_of_the_numbers_in_the_card(auto, 
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fit", FITS, ids=lambda fit: fit.material.name)
 def test_the_initial_modulus_is_that_of_the_draw(auto, fit):
     law = fit.law(DrawStresses(auto))
@@ -79,6 +81,7 @@ def test_ogden_terms_on_the_ladder_are_found_again(given):
     assert found == pytest.approx([0.2, 0.5, 0.1, *exponents], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_single_ogden_term_finds_its_exponent_closely(given):
     # neo-Hooke is alpha = 2 and mu = 2 C10; the exponents tried lie a 64th of the first ladder's largest apart.
     like = given([("neo-hookean", [0.5])])
@@ -106,6 +109,7 @@ def _work(energy, one, two, axis):
     return complex(energy((moved[0], moved[1], 1 / (moved[0] * moved[1])))).imag / 1e-30
 
 
+@pytest.mark.slow
 def test_the_default_of_a_free_energy_is_near_and_mostly_stable(auto):
     # Where single stretches leave their measured range, a draw goes on with an exponent of heavy tails, which a
     # polynomial follows less closely than the smooth function that was measured.

@@ -81,6 +81,7 @@ def test_a_law_that_only_jax_can_differentiate_is_judged_too(given):
     assert found == pytest.approx(like.stress(states, states.points))
 
 
+@pytest.mark.slow
 def test_draws_of_such_a_law_are_stable_too(data):
     def law(I1, I2, mu):
         return 0.5 * mu * (jnp.exp(I1 - 3) - 1)

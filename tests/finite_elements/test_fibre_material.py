@@ -58,6 +58,7 @@ def test_the_energy_is_that_of_fibres_at_their_angles_where_they_are_stretched()
     np.testing.assert_allclose(material("standard-reinforcing").function([F, None])[0], 1e3 * expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 def test_stress_and_tangent_are_derivatives_of_the_energy(name):
     umat, F = material(name), gradients(8)
@@ -69,6 +70,7 @@ def test_stress_and_tangent_are_derivatives_of_the_energy(name):
     np.testing.assert_allclose(found, found.transpose(2, 3, 0, 1, 4), atol=1e-13 * np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 def test_the_reference_has_no_stress_and_equal_stretches_have_a_tangent(name):
     umat = material(name)
@@ -91,6 +93,7 @@ def test_the_stress_turns_with_the_body_and_with_its_directions(name):
     assert np.abs(other - body).max() > 1e-2 * np.abs(P).max()  # the directions matter
 
 
+@pytest.mark.slow
 def test_directions_may_differ_from_point_to_point_and_from_cell_to_cell():
     F = gradients(6).reshape(3, 3, 2, 3)
     name, each = "holzapfel-gasser-ogden", np.array([turn[:2] for turn in rotations(6, 11)])
@@ -126,6 +129,7 @@ def test_directions_are_two_unit_vectors_at_a_right_angle(which):
         material("standard-reinforcing", NO_AXES[which])
 
 
+@pytest.mark.slow
 def test_fibres_are_compiled_once_for_all_draws_and_directions():
     traced = []
 
@@ -229,6 +233,7 @@ FIRST, SECOND = (", ".join(f"{each:.15g}" for each in axis) for axis in IN_PLANE
 ORIENTATION = f"*ORIENTATION, NAME=TURNED\n{FIRST}, {SECOND}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
 @pytest.mark.parametrize("case", [TILTED, TWO_FAMILIES], ids=["one family", "two families"])
 def test_calculix_has_the_same_stress_in_simple_shear(card_of, tmp_path, case):

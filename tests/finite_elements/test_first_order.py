@@ -30,6 +30,7 @@ def ensemble_of(posterior):
     return ensemble
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", COARSE.values(), ids=COARSE)
 def test_draws_that_are_proportional_have_their_forces(ensemble_of, case):
     rows = [[1e-3, 2e-3, 0.0], [0.7e-3, 1.4e-3, 0.0]]
@@ -42,6 +43,7 @@ def test_draws_that_are_proportional_have_their_forces(ensemble_of, case):
     np.testing.assert_allclose(found.unevenness, 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", COARSE.values(), ids=COARSE)
 def test_what_is_lacking_is_of_second_order(ensemble_of, case):
     """Half the difference between two laws has a quarter of the error."""
@@ -124,6 +126,7 @@ def test_the_draws_in_full_are_the_farthest_and_some_between():
     assert draws_in_full(found, 99) == list(range(20))
 
 
+@pytest.mark.slow
 def test_a_simulation_with_few_full_runs_has_the_band_of_one_with_all(posterior):
     case = replace(COARSE["indentation"], depth=0.15)
     every, some = (simulate(posterior, case, 16, steps=2, check_mesh=False, full_runs=full) for full in (None, 5))

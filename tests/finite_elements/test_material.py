@@ -124,6 +124,7 @@ def test_a_draw_has_the_engineering_stress_that_its_ensemble_says(draws, mode):
         np.testing.assert_allclose(P[0, 0] - free, draws.stress(path, stretch)[number], rtol=2e-5, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_an_energy_that_only_jax_differentiates_is_compiled_once(draws):
     traced = []
 

@@ -74,6 +74,7 @@ def test_a_cylinder_and_a_sheet_have_the_force_of_their_state(tmp_path, name, sh
     assert found.force[0] == pytest.approx(-stress * area, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hexahedron", "tetra10", "quad", "triangle6"])
 def test_a_plane_that_is_pressed_on_a_block_compresses_it(tmp_path, name):
     """The penalty lets the block be a little longer than the way of the plane."""
@@ -97,6 +98,7 @@ def test_a_shallow_sphere_has_the_force_of_hertz():
     np.testing.assert_allclose(found.force, 16 / 9 * 3 * modulus * found.travel**1.5, rtol=3e-3)
 
 
+@pytest.mark.slow
 def test_a_sphere_is_also_one_of_a_mesh(tmp_path):
     sizes = {"depth": 0.3, "fineness": 0.3}
     wanted = SphericalIndentation(**sizes)
@@ -111,6 +113,7 @@ def test_a_sphere_is_also_one_of_a_mesh(tmp_path):
     np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_power_of_stresses_on_the_rates_of_strain_is_the_force_under_a_tip(posterior):
     """What follows to first order from a draw is exact for that draw itself."""
     case, draws = SphericalIndentation(depth=0.3, fineness=0.3), posterior.ensemble(4)

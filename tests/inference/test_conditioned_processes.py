@@ -41,6 +41,7 @@ def kernel(name, stretch, psi, points=1201):
     return oracle.scaled(stretch, psi, ENDS, 10 * np.sqrt(len(STRETCH)), points=points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["gp-pinned", "gp-orthogonal"], NAMES))
 def test_evidence_and_posterior_are_those_of_dense_quadrature(name):
     linear, axes = parts("gp")
@@ -92,6 +93,7 @@ def test_many_points_have_the_spectrum_of_the_whole_matrix(name, psi):
     np.testing.assert_allclose((found.vectors * found.values) @ found.vectors.T, dense, atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_joint_density_of_the_samplers_is_the_dense_one(name):
     posterior = tq.fit(DATA, discrepancy=name, noise_sd=NOISE)
@@ -114,6 +116,7 @@ def test_many_data_sets_share_the_factorisations_and_get_the_same_posteriors(nam
         assert posterior.solution.marginals["C10"].sd == pytest.approx(alone.solution.marginals["C10"].sd, rel=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("replicates", "least", "most"), [(3, 28, 18), pytest.param(10, 104, 72, marks=pytest.mark.statistical)]
 )

@@ -13,6 +13,7 @@ def modes_of(log_density, box, start):
     return find_modes(derivatives_on_line(log_density, box), box, start, np.random.default_rng(0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "point", [[0.0, 3.0, -4.0, 0.0], [-1e6, 2 + 1e-9, -1e9, -50 + 1e-9], [1e6, 1e9, -3 - 1e-9, 49.999]]
 )
@@ -26,6 +27,7 @@ def test_a_distance_to_a_bound_at_zero_keeps_its_relative_accuracy(distance):
     np.testing.assert_allclose(box.from_line(box.to_line([distance, -distance])), [distance, -distance], rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [-1e3, 1e3])
 def test_rounding_never_puts_a_point_on_a_bound(far):
     box = Box([0.0, -50.0, 1e6, -10.0], [10.0, 50.0, 1e6 + 1, 0.0])
@@ -33,16 +35,19 @@ def test_rounding_never_puts_a_point_on_a_bound(far):
     assert np.all((box.lower < point) & (point < box.upper))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", [[0.3, 0.3, 0.3, 0.3], [-5.0, -9.0, -9.0, -5.0], [700.0, 5.0, 5.0, 5.0]])
 def test_the_log_jacobian_is_the_log_of_the_slopes(line):
     slopes = np.diag(jax.jacfwd(KINDS.from_line)(jnp.array(line)))
     assert KINDS.log_jacobian(jnp.array(line)) == pytest.approx(np.log(np.abs(slopes)).sum(), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_slopes_stay_finite_where_an_unused_branch_overflows():
     assert np.isfinite(jax.jacfwd(KINDS.from_line)(jnp.array([1e4, 1.0, 1.0, 1e4]))).all()
 
 
+@pytest.mark.slow
 def test_a_uniform_density_between_two_bounds_becomes_standard_normal():
     on_line = log_density_on_line(lambda x: -jnp.log(10.0), Box([0.0], [10.0]))
     assert on_line(jnp.array([1.7])) == pytest.approx(-0.5 * 1.7**2 - 0.5 * np.log(2 * np.pi), abs=1e-14)
@@ -67,6 +72,7 @@ def test_whitening_and_its_inverse_cancel():
     np.testing.assert_allclose(mode.whiten(mode.unwhiten(np.array([1.0, 2.0, 3.0]))), [1.0, 2.0, 3.0])
 
 
+@pytest.mark.slow
 def test_a_second_mode_with_probability_is_found_and_a_negligible_one_is_not():
     def two_peaks(log_weight):
         def log_density(x):

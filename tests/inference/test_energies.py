@@ -205,6 +205,7 @@ def test_a_lattice_that_ends_too_soon_is_made_again(monkeypatch, largest):
     np.testing.assert_allclose(again.summary().loc["C10"], whole.loc["C10"], rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("noise", "scale"),
     slow_but(

@@ -76,6 +76,7 @@ def test_two_parameters_that_must_be_positive(discrepancy, shift):
     assert_agrees(posterior, problem, refine=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", slow_but([-0.01], [0.01, -0.01]))
 def test_three_parameters_that_must_be_positive_under_one_covariance(shift):
     """Evidence and moments of a Gaussian in an octant, by SciPy and by its draws; the size of the error is known."""
@@ -117,6 +118,7 @@ def test_bounds_that_no_parameter_breaks_alone_but_all_do_together(shift):
     assert_agrees(posterior, problem, refine=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["linear", "yeoh"])
 def test_draws_and_predictions_stay_within_all_bounds(discrepancy):
     linear, axes = narrow(discrepancy)

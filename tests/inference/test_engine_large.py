@@ -72,6 +72,7 @@ def test_a_million_points_with_a_free_amplitude_give_a_one_dimensional_integral(
     assert found.mean == pytest.approx(best, abs=0.01 * found.sd + 1 / n)
 
 
+@pytest.mark.slow
 def test_the_same_measurements_in_pieces_are_those_at_once(million):
     stress, data = million
     options = {"discrepancy": "yeoh", "noise_sd": 0.08}
@@ -85,6 +86,7 @@ def test_the_same_measurements_in_pieces_are_those_at_once(million):
     assert (np.abs(posterior.summary()["mean"] - whole.summary()["mean"]) < 1e-6 * sd).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_sd", slow_but([0.1], [0.1, 0.001]))
 def test_two_thousand_points_of_a_process_are_those_of_a_dense_cholesky_factor(noise_sd):
     generator = np.random.default_rng(3)

@@ -27,6 +27,7 @@ def growing(stretch, seed, floor=0.03, share=0.08):
     return yeoh(stretch) + (floor + share * level) * np.random.default_rng(seed).standard_normal(len(stretch))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["none", "constant"])
 def test_unknown_noise(discrepancy):
     linear, axes = parts(discrepancy)
@@ -39,6 +40,7 @@ def test_unknown_noise(discrepancy):
     assert abs(found.sd / truth.sds["noise_sd"] - 1) <= 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["none", pytest.param("mooney-rivlin", marks=pytest.mark.slow)])
 def test_noise_that_grows_with_the_stress(discrepancy):
     linear, axes = parts(discrepancy)
@@ -66,6 +68,7 @@ def test_the_level_matters_to_the_evidence():
     assert abs(posterior.log_evidence - integrate(wrong).log_evidence) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "discrepancy", ["constant", *(pytest.param(name, marks=pytest.mark.slow) for name in ("mooney-rivlin", "yeoh"))]
 )
@@ -87,6 +90,7 @@ def test_repeated_measurements_share_the_independent_discrepancy(discrepancy):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", slow_but(["repeats"], ["unknown", "repeats"]))
 def test_repeats_of_a_process_and_of_no_discrepancy_are_plain_unknown_noise(noise):
     stress = yeoh(REPEATED) + 0.05 * np.random.default_rng(1).standard_normal(len(REPEATED))

@@ -65,6 +65,7 @@ def agrees(symbol, posterior, truth):
     assert abs(found.sd / truth.sds[symbol] - 1) <= 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["S", "noise_sd"])
 def test_one_term_with_an_amplitude_or_unknown_noise(kind):
     linear, axes = {"mu1": Linear(-10, 10)}, {"alpha1": Axis(0.5, 40, 1.0), kind: Axis(1e-4, 2, 0.02)}

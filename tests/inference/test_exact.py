@@ -152,6 +152,7 @@ def test_unknown_noise_agrees_with_a_brute_force_grid():
         assert marginal.sd == pytest.approx(spread, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_gaussian_process_with_unknown_noise_agrees_with_dense_tensor_quadrature():
     stretch = np.linspace(0.8, 2, 12)
     data = tq.simulate("yeoh", TRUTH, stretch, 0.1, seed=5)

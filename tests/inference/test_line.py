@@ -76,6 +76,7 @@ def law(rate):
     return tq.FunctionLaw(demiray)
 
 
+@pytest.mark.slow
 def test_a_parameter_is_summed_as_fits_with_it_known_are():
     data = tq.simulate("demiray", {"mu": 1.0, "b": 0.8}, STRETCH, noise_sd=0.02, seed=2)
     options = {"discrepancy": "taylor", "priors": {"mu": tq.Uniform(0, 5)}}
@@ -96,6 +97,7 @@ def test_a_parameter_is_summed_as_fits_with_it_known_are():
     assert table.loc["mu", "mean"] == pytest.approx(weights @ moduli, rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("material", ["gent", "arruda-boyce"])
 def test_a_law_that_locks_is_fitted_where_the_data_do_not_show_it(material):
     data = tq.simulate("yeoh", {"C10": 0.01, "C20": 0.002, "C30": 0.001}, np.linspace(0.8, 1.6, 40), 0.0005, seed=1)
@@ -106,6 +108,7 @@ def test_a_law_that_locks_is_fitted_where_the_data_do_not_show_it(material):
     assert high > 3 * low
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_sd", [1e-3, None])
 def test_the_middle_of_a_prior_may_have_no_stress(noise_sd):
     """Ogden's energy divides by its exponent."""

@@ -59,6 +59,7 @@ def test_the_mass_within_two_bounds_is_that_of_dense_panels():
     assert error.max() < 1e-3
 
 
+@pytest.mark.slow
 def test_the_mass_within_three_bounds_does_not_depend_on_their_order():
     covariance, low, high = gaussians(16, 3)
     first, error = nested_log_mass(np.linalg.cholesky(covariance), low, high)
@@ -77,6 +78,7 @@ def test_independent_parameters_have_the_product_of_their_masses():
     assert error[0] < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("k", "shift", "size"),
     [
@@ -112,6 +114,7 @@ def test_draws_of_parameters_far_from_their_bounds_follow_those_that_are_cut():
     assert np.abs(np.cov(drawn.T) - np.cov(kept.T)).max() < 0.05
 
 
+@pytest.mark.slow
 def test_four_bounds_go_by_points_and_sweeps():
     covariance = 0.5 * np.ones((4, 4)) + 0.5 * np.eye(4)
     box = Boxes(np.zeros((1, 4)), np.full((1, 4), np.inf))

@@ -70,6 +70,7 @@ def test_a_density_piled_up_at_zero_is_recovered():
     assert low.mean() == pytest.approx(0.01, abs=ERRORS_ALLOWED * np.sqrt(0.01 / 400))
 
 
+@pytest.mark.slow
 def test_half_bounded_and_free_coordinates_are_recovered():
     def log_density(x):
         above, below = x[0] - 2.0, -3.0 - x[1]
@@ -141,6 +142,7 @@ def two_modes(x):
     return jnp.logaddexp(-50 * (x[0] + 5) ** 2, -50 * (x[0] - 5) ** 2)
 
 
+@pytest.mark.slow
 def test_two_far_modes_are_reported_as_not_converged():
     draws = sample_nuts(two_modes, [-10.0], [10.0], [1.0], names=["C10"])
     assert not draws.converged
@@ -149,6 +151,7 @@ def test_two_far_modes_are_reported_as_not_converged():
     assert "the chains stay in different places" in draws.verdict
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
     first, again, other = (
         sample_nuts(two_modes, [-10.0], [10.0], [1.0], NutsSettings(seed=seed)).values for seed in (3, 3, 4)

@@ -28,6 +28,7 @@ def model_of(settings, formulation):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "formulation", [name if name == "none" else pytest.param(name, marks=pytest.mark.slow) for name in FORMULATIONS]
 )
@@ -72,6 +73,7 @@ def test_the_joint_density_is_that_of_scipy(paper, formulation):
     assert float(density(point, data)) == pytest.approx(expected, rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", [name for name in FORMULATIONS if name != "none"])
 def test_the_density_with_linear_parameters_integrated_is_that_of_the_exact_route(paper, formulation):
     model = model_of(paper, formulation)
@@ -86,6 +88,7 @@ def test_the_density_with_linear_parameters_integrated_is_that_of_the_exact_rout
     np.testing.assert_allclose(root @ root.T, covariance, atol=1e-8 * np.abs(covariance).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "material",
     [Ogden1(), *(pytest.param(own, marks=pytest.mark.slow) for own in (Ogden2(), Ogden3()))],
@@ -121,6 +124,7 @@ def test_nuts_on_the_nonlinear_parameters_alone_agrees_with_the_exact_route(pape
         assert b.sd == pytest.approx(a.sd, rel=0.15)
 
 
+@pytest.mark.slow
 def test_the_joint_method_gives_no_evidence_and_says_how_it_converged():
     posterior = gallery.sampled_jointly()
     assert posterior.log_evidence is None

@@ -79,6 +79,7 @@ class Line:
         return best - normal.logpdf(self.mean) + np.log(inside) - np.log(self.upper - self.lower).sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("terms", "largest_error"), [(2, 0.2), pytest.param(6, 0.3, marks=pytest.mark.slow)])
 def test_a_posterior_a_thousandth_as_wide_as_the_prior_is_found_with_its_evidence(terms, largest_error):
     line = Line(terms, noise=0.01, half_width=500.0)
@@ -93,6 +94,7 @@ def test_a_posterior_a_thousandth_as_wide_as_the_prior_is_found_with_its_evidenc
     )
 
 
+@pytest.mark.slow
 def test_a_posterior_cut_by_the_walls_of_its_box_has_the_evidence_that_scipy_integrates():
     line = Line(3, noise=0.1, half_width=1.0, centre=1.5)
     draws = sample_uniform(line.log_likelihood, line.lower, line.upper)
@@ -224,6 +226,7 @@ def small_run(seed, prior_seed=None, **changes):
     return sample_smc(SMALL.log_likelihood, flat, SMALL.lower, SMALL.upper, draws, settings)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled_once")
 @pytest.mark.parametrize(
     ("count", "low", "high"), [(8, 0.25, 2.0), pytest.param(24, 0.5, 1.55, marks=pytest.mark.statistical)]
@@ -237,6 +240,7 @@ def test_the_stated_error_is_the_spread_of_the_log_evidence(count, low, high):
     assert abs(np.mean(scores)) < 4.4 / np.sqrt(count)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(monkeypatch, small_program):
     compiled_anew = small_run(3)
     monkeypatch.setattr(smc, "compiled_program", lambda *problem: small_program)
@@ -246,6 +250,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(monkeypatch
     assert small_run(4, prior_seed=3).log_evidence != again.log_evidence
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled_once")
 def test_what_is_wrong_is_said_with_what_to_try():
     draws = small_run(0, max_sweeps=1)

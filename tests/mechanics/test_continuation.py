@@ -226,6 +226,7 @@ def test_a_draw_goes_on_by_the_stated_formula_with_one_score_in_all_directions(p
                 assert draw.energy(stretches_of(strain * unit)) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_scores_of_draws_have_students_distribution_without_the_outermost_tails(posteriors):
     # By the shares of 1024 quasi-random draws below scores at which no exponent here is clipped: right within 0.01.
     posterior, unit = posteriors["taylor"], unit_along(1.0)

@@ -50,6 +50,7 @@ def test_energy_and_stress_have_no_jump_where_fibres_begin_to_bear(law):
     assert np.abs(engineering_stress(fibres, Planar(), near, values)).max() < 1e-5
 
 
+@pytest.mark.slow
 @EVERY_LAW
 def test_the_compiled_stress_is_that_of_the_imaginary_step_on_both_sides_of_the_branch(law):
     fibres = material_named(f"neo-hookean+{law}")

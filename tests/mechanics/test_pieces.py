@@ -45,6 +45,7 @@ def test_an_imaginary_step_gives_the_slope(function):
     np.testing.assert_allclose(function(places + 1e-30j).imag / 1e-30, function.slope(places), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_jax_differentiates_it_twice(function):
     differentiator()
     second = jax.vmap(jax.grad(jax.grad(lambda place: function(place))))(jnp.asarray(INSIDE))

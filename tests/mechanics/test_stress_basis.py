@@ -33,6 +33,7 @@ def test_a_material_without_nonlinear_parameters_needs_no_setting():
     assert stress_basis(NeoHookean(), Planar().at(STRETCH), np.empty((4, 0))).shape == (4, 15, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "measured",
     [own if k % 4 == 0 else pytest.param(own, marks=pytest.mark.slow) for k, own in enumerate(MEASURED)],

@@ -74,6 +74,7 @@ def laws(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "same", "values"),
     [
@@ -90,6 +91,7 @@ def test_a_law_in_a_file_is_the_law_of_the_library(laws, name, same, values):
         np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_an_argument_is_linear_without_a_default_and_has_its_prior_otherwise(laws):
     law = tq.load_material("laws.py:exponential")
     assert [(p.symbol, p.unit, p.is_linear) for p in law.parameters] == [("mu", "MPa", True), ("b", "", False)]
@@ -100,6 +102,7 @@ def test_an_argument_is_linear_without_a_default_and_has_its_prior_otherwise(law
     assert low < 2.0 < high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "claim"),
     [
@@ -113,6 +116,7 @@ def test_a_law_that_is_wrong_by_a_thousandth_is_found(laws, law, claim):
         tq.load_material(f"laws.py:{law}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "words"),
     [
@@ -145,6 +149,7 @@ def test_a_law_in_a_file_is_run_only_where_a_person_names_it(laws):
         material_named("trap.py:W", laws=True)
 
 
+@pytest.mark.slow
 def test_a_law_in_a_file_can_be_part_of_a_sum(laws):
     law = material_named("laws.py:logarithmic+mooney-rivlin", laws=True)
     assert [p.symbol for p in law.parameters] == ["mu", "C10", "C01"]

@@ -63,6 +63,7 @@ def test_one_pass_serves_the_model_with_discrepancy_and_the_one_without():
     assert len(both[0].points) % NODES_PER_PIECE == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("material", "discrepancy"),
     slow_but(
@@ -89,6 +90,7 @@ def test_measurements_left_out_have_the_density_that_all_rows_give(as_rows):
     np.testing.assert_allclose(found, left_out_log_density(every.model, some), atol=1e-7)
 
 
+@pytest.mark.slow
 def test_coverage_counts_measurements_inside_the_band_at_their_own_stretches():
     solution = tq.fit(measured(), discrepancy="yeoh").solution
     data = solution.model.experiment

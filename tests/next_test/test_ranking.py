@@ -42,6 +42,7 @@ def test_the_usual_tests_are_ranked_where_none_is_given(posterior):
         posterior.design(points=(0,))
 
 
+@pytest.mark.slow
 def test_a_material_that_may_lock_has_no_numbers_beyond(posterior):
     data = tq.simulate("gent", {"mu": 1.0, "Jm": 1.2}, np.linspace(0.75, 1.6, 16), NOISE, seed=1)
     locking = tq.fit(data, material="gent", discrepancy="none", noise_sd=NOISE)
@@ -54,6 +55,7 @@ def test_a_material_that_may_lock_has_no_numbers_beyond(posterior):
         locking.design(["uniaxial 1.1:2.5 8"])
 
 
+@pytest.mark.slow
 def test_few_components_are_told():
     data = tq.simulate("mooney-rivlin", {"C10": 0.5, "C01": 0.02}, STRETCH, NOISE, seed=1)
     stable = tq.fit(data, material="mooney-rivlin", discrepancy="none", noise_sd=NOISE, stable_in="all")

@@ -52,6 +52,7 @@ def by_quadrature(specimens):
     return np.array(means), np.sqrt(np.array(squares) - np.square(means))
 
 
+@pytest.mark.slow
 def test_an_effect_agrees_with_quadrature(found):
     """Means within four standard errors of 1000 draws and sds within 15 %: by chance once in some ten thousand runs."""
     mean, sd = by_quadrature(specimens_of(MODULI))
@@ -65,6 +66,7 @@ def test_an_effect_agrees_with_quadrature(found):
     assert found.hierarchy.effective > 0.9
 
 
+@pytest.mark.slow
 def test_effects_are_factors_per_unit(found):
     table = found.effects()
     row = table.loc[("C10", "age")]
@@ -81,6 +83,7 @@ def test_effects_are_factors_per_unit(found):
     assert share["median"] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_new_patient_has_the_covariates_that_are_given(found, tmp_path):
     old, young = found.given({"age": 65}), found.given({"age": 25})
     assert np.median(old.new) > 1.5 * np.median(young.new)
@@ -101,6 +104,7 @@ def test_a_new_patient_has_the_covariates_that_are_given(found, tmp_path):
             found.given(values)
 
 
+@pytest.mark.slow
 def test_effects_are_saved_with_their_names(found, tmp_path):
     found.save(tmp_path / "population.nc")
     tree = xr.open_datatree(tmp_path / "population.nc", engine="h5netcdf").load()

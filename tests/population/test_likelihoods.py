@@ -94,6 +94,7 @@ def test_a_gaussian_that_is_split_keeps_its_weight_and_its_moments_under_the_log
     assert own[1, 1] == pytest.approx(0.01 / 4, rel=0.02)
 
 
+@pytest.mark.slow
 def test_two_parameters_under_an_energy_are_represented_jointly():
     """Against the mixture that the fit gives, evaluated by itself: sd of the log ratio at its own draws below 0.1."""
     truth = {"C10": 0.5, "C20": 0.05, "C30": 0.0}
@@ -172,6 +173,7 @@ def test_a_new_specimen_has_the_covariance_of_the_population():
     assert (np.abs(np.cov(drawn.T) - covariance) < 5 * error).all()
 
 
+@pytest.mark.slow
 def test_correlations_have_the_prior_of_lewandowski_kurowicka_and_joe_and_effects_a_normal_one():
     """Its density is det(Omega)^(2 - 1) over the correlations, here brought to the partial ones by their Jacobian."""
     generator, spread = np.random.default_rng(4), 0.7

@@ -38,6 +38,7 @@ def found():
     return neo_hookean(specimens_of(MODULI))
 
 
+@pytest.mark.slow
 def test_they_have_mean_and_sd_of_the_predictive_distribution(found):
     """By quadrature: the logarithm of a new C10 is m + tau z, so that its variance is Var m + E tau^2.
 
@@ -51,6 +52,7 @@ def test_they_have_mean_and_sd_of_the_predictive_distribution(found):
     assert logs.std() > 2 * np.log([draw.values["C10"] for draw in found.complete.ensemble(256)]).std()
 
 
+@pytest.mark.slow
 def test_they_are_stable_where_some_patients_of_the_population_are_not():
     specimens = {
         f"s{place}": tq.simulate("mooney-rivlin", {"C10": C10, "C01": C01}, STRETCH, noise_sd=0.005, seed=place)
@@ -64,6 +66,7 @@ def test_they_are_stable_where_some_patients_of_the_population_are_not():
     assert stable.admissible_share < 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
 def test_their_cards_give_the_stress_of_their_law(found, tmp_path):
     """CalculiX on one element, against W = C10 (I1 - 3) with C10 as the draw has it."""
@@ -82,6 +85,7 @@ def test_their_cards_give_the_stress_of_their_law(found, tmp_path):
     assert cards.warnings[0].startswith("The draws are those of a new patient of the population of 6 specimens")
 
 
+@pytest.mark.slow
 def test_it_is_said_that_the_model_error_of_the_specimens_is_left_out():
     specimens = specimens_of(MODULI)
     patient = tq.fit_population(specimens, discrepancy="constant", noise_sd=NOISE_SD).patient

@@ -15,6 +15,7 @@ def population():
     return tq.fit_population(specimens, discrepancy="none", noise_sd=0.01)
 
 
+@pytest.mark.slow
 def test_every_specimen_is_a_row_with_its_intervals_in_the_unit_of_the_measurements(population):
     figure, given = plt.subplots()
     axis = population.plot(given)
@@ -29,6 +30,7 @@ def test_every_specimen_is_a_row_with_its_intervals_in_the_unit_of_the_measureme
     plt.close(figure)
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_the_population_in_the_unit_of_the_measurements(population):
     page = population._repr_html_()
     summary = population.summary(unit="MPa")["median"]
@@ -38,6 +40,7 @@ def test_a_notebook_shows_the_population_in_the_unit_of_the_measurements(populat
     assert not plt.get_fignums()
 
 
+@pytest.mark.slow
 def test_a_new_patient_is_drawn_as_predicted_for_measurements_that_were_not_fitted(population):
     axis = population.patient.plot()
     assert axis.get_title(loc="left") == "predicted, not fitted to these"

@@ -104,6 +104,7 @@ def test_every_specimen_may_have_a_noise_of_its_own(of_several_noises):
     assert pooled.sd == pytest.approx(1 / np.sqrt(precision.sum() * (basis @ basis)), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_tests_of_one_specimen_may_have_noises_of_their_own_and_others_unknown_ones(of_several_noises):
     specimens, _ = of_several_noises
     tests = specimens | {"s0": [specimens["s0"], specimens["s1"]]}
@@ -144,6 +145,7 @@ def test_specimens_that_differ_widely_keep_their_own_posteriors():
         assert table[pooled].to_numpy() == pytest.approx(table[alone].to_numpy(), rel=3e-3)
 
 
+@pytest.mark.slow
 def test_specimens_move_towards_the_population_and_the_poorly_measured_ones_most():
     good, poor = specimens_of([0.4, 0.45, 0.5, 0.55], 0.01), specimens_of([0.9, 0.2], 0.3, seed=7)
     weak = {f"poor {name}": tq.Experiment("uniaxial", each.stretch, each.stress) for name, each in poor.items()}
@@ -204,6 +206,7 @@ def test_a_new_patient_is_as_different_as_the_specimens(found):
     assert other["median"][0] == pytest.approx(np.median(found.new) * 2 * (1.1 - 1.1**-5), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_new_patient_has_the_model_error_that_specimens_have():
     """Yeoh specimens that are alike but for a factor: neo-Hookean with the error in proportion is the curve itself."""
     stretch = np.linspace(0.8, 1.6, 12)

@@ -31,6 +31,7 @@ def test_what_is_then_known_of_exact_specimens_is_students_t(count):
     assert patient == pytest.approx(quantile * scale * np.sqrt(1 + 1 / count), rel=2e-2)
 
 
+@pytest.mark.slow
 def test_what_is_known_now_is_what_was_sampled_and_more_specimens_for_a_narrower_median(found):
     tables = {aim: found.specimens_needed(aim).loc["C10"] for aim in (0.3, 1.0, 5.0)}
     for quantity, draws in (("median", found.median), ("new patient", found.new)):
@@ -47,6 +48,7 @@ def test_what_is_known_now_is_what_was_sampled_and_more_specimens_for_a_narrower
             found.specimens_needed(aim)
 
 
+@pytest.mark.slow
 def test_with_so_many_specimens_four_of_five_futures_reach_the_aim_by_students_t():
     """Futures of well measured specimens from 4000 draws of m and tau, under flat priors: 80 % within 7.
 

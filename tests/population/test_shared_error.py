@@ -45,6 +45,7 @@ def exact_sd_of_the_mean(y, covariance_of_error, is_shared):
     return np.sqrt(weights @ (variance + mean**2) - (weights @ mean) ** 2)
 
 
+@pytest.mark.slow
 def test_a_median_is_known_as_well_as_the_exact_posterior_says_and_its_share_of_the_error_allows():
     """The independent part stays in, a share 1 / n of the variance; 1000 effective draws, sds within 10 %."""
     generator = np.random.default_rng(5)
@@ -175,6 +176,7 @@ def apart(specimens):
     return tq.fit_population(specimens, discrepancy="gp", noise_sd=NOISE_SD)
 
 
+@pytest.mark.slow
 def test_the_bias_is_that_of_median_specimens_and_new_patient_in_the_same_draw(found, apart):
     """4000 draws: their sd within five standard errors."""
     bias = found.hierarchy.mean - apart.hierarchy.mean
@@ -194,6 +196,7 @@ def test_the_bias_is_that_of_median_specimens_and_new_patient_in_the_same_draw(f
     assert needed["floor"]["median"] == pytest.approx(np.sinh(1.96 * np.sqrt(variance)), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_page_says_how_wide_the_interval_would_be_otherwise(found, apart):
     independent, shared = (f"{100 * width:.2g} %" for width in found.median_half_widths().loc["C10"])
     assert f"C10 {shared} ({independent}); in brackets if the model error is independent." in _note(found)

@@ -27,6 +27,7 @@ def both(request):
     return request.param, *(tq.fit_population(specimens(unit), **options) for unit in ("MPa", request.param))
 
 
+@pytest.mark.slow
 def test_tables_of_a_population_are_in_the_unit_of_the_data(both):
     unit, in_mpa, found = both
     factor = {"kPa": 1e3, "Pa": 1e6}[unit]

@@ -49,10 +49,10 @@ FITS = {
 }
 
 
-SLOW = ("nuts", "exponents beside an energy", "stable average")
-"""Of two that are sampled, have exponents or are stable, the other is in the quick tests."""
-SAVED_AGAIN = ("closed form", "process", "energies", "joint")
-"""One of each representation, saved a second time in the quick tests, where all are saved once."""
+SLOW = ("nuts", "joint", "exponents beside an energy", "average of two tests", "stable average")
+"""What is sampled, and of two that have exponents, are stable or are of several tests the dearer one."""
+SAVED_AGAIN = ("closed form", "process", "energies")
+"""Those that are saved a second time in the quick tests."""
 
 
 @pytest.fixture(
@@ -137,6 +137,7 @@ def test_what_is_saved_again_is_the_same(pair, tmp_path):
         xr.testing.assert_identical(one.load(), other.load())
 
 
+@pytest.mark.slow
 def test_arviz_reads_the_same_arrays_from_the_file_as_in_memory(pair):
     before, _, path = pair
     with xr.open_datatree(path, engine="h5netcdf") as tree:

@@ -37,6 +37,7 @@ def auto():
     return many_draws("auto")[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
     "discrepancy",
@@ -54,6 +55,7 @@ def test_draws_are_spread_as_the_exact_predictions_are(discrepancy, mode):
         assert (np.abs(np.quantile(stress, probability, axis=0) - band[end]) < error * sd).all()
 
 
+@pytest.mark.slow
 def test_what_is_unknown_beyond_the_measured_stretches_is_in_the_draws():
     # Tension only: within the measured invariants, equibiaxial tension compresses the thickness further than tension
     # of the test did its width, so that a function of single stretches is not known there.
@@ -66,6 +68,7 @@ def test_what_is_unknown_beyond_the_measured_stretches_is_in_the_draws():
     assert np.ptp(np.quantile(stress, [0.025, 0.975])) == pytest.approx(width, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_draw_is_a_material_whose_stress_is_the_derivative_of_its_energy(auto, mode):
     draws, mode = auto.ensemble(4), loading_mode(mode)
@@ -79,12 +82,14 @@ def test_a_draw_is_a_material_whose_stress_is_the_derivative_of_its_energy(auto,
         assert path_energy(draw, mode.path, np.ones(1), ())[0] == pytest.approx(0.0, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_draws_differ_though_they_are_materials_without_parameters(auto):
     first, second = auto.ensemble(2)
     assert first != second
     assert len({first, second}) == 2
 
 
+@pytest.mark.slow
 def test_the_initial_modulus_is_the_materials_own(auto):
     for draw in auto.ensemble(3):
         assert tq.initial_shear_modulus(draw, ()) == pytest.approx(2 * draw.values["C10"], rel=1e-6)
@@ -99,6 +104,7 @@ def test_further_terms_of_a_material_are_part_of_the_draws():
         np.testing.assert_allclose(tq.engineering_stress(draw, loading_mode("uniaxial"), [1.5], ()), expected)
 
 
+@pytest.mark.slow
 def test_alone_keeps_the_parameters_and_drops_the_discrepancy(auto):
     draws = auto.ensemble(3)
     for draw, own in zip(draws, draws.alone, strict=True):
@@ -108,6 +114,7 @@ def test_alone_keeps_the_parameters_and_drops_the_discrepancy(auto):
         )
 
 
+@pytest.mark.slow
 def test_draws_that_are_not_stable_are_left_out_and_counted():
     # Data of tension only leave the second invariant open, so that many draws are not stable.
     posterior = fitted("auto", stretch=np.linspace(1.05, 1.8, 20))

@@ -59,6 +59,7 @@ def test_many_experiments_on_mixed_stretches_are_those_one_by_one(discrepancy, w
         assert_same(found, tq.fit(data, **options))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("discrepancy", "with_priors"),
     slow_but([("none", True), ("constant", False)], product(["none", "constant", "yeoh"], (True, False))),

@@ -44,6 +44,7 @@ def test_every_law_has_the_numbers_of_its_own_fit(compared, single):
         assert (row.modulus_low, row.modulus_high) == (low, high)
 
 
+@pytest.mark.slow
 def test_laws_that_are_divided_among_processes_have_the_same_numbers(compared):
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         divided = tq.fit_laws(DATA, NAMES, pool=pool, **OPTIONS)
@@ -130,6 +131,7 @@ def test_what_cannot_be_compared_is_said(laws, options, message):
         tq.fit_laws(DATA, laws, **OPTIONS | options)
 
 
+@pytest.mark.slow
 def test_all_are_those_without_fibres_and_what_cannot_be_fitted_is_said():
     few = tq.Experiment("uniaxial", [1.1, 1.2], [0.1, 0.2])
     compared = tq.fit_laws(few, discrepancy="none", noise_sd=0.02, tolerances="as-tested")

@@ -300,6 +300,7 @@ def test_a_notebook_shows_a_posterior_without_any_further_fit(posterior, monkeyp
     assert "<svg" in posterior._repr_html_()
 
 
+@pytest.mark.slow
 def test_importing_and_fitting_do_not_import_matplotlib():
     code = (
         "import sys, tissuq as tq\n"

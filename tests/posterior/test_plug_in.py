@@ -124,6 +124,7 @@ def test_tests_that_no_stable_energy_reconciles_are_fitted_by_simpler_ones_and_s
     assert low < 0.055 < high
 
 
+@pytest.mark.slow
 def test_tests_of_one_stable_material_do_not_contradict():
     posterior = tq.fit(compressed_and_sheared(0.0))
     assert posterior.model.fitted_errors.reconciling_stability is None
@@ -131,6 +132,7 @@ def test_tests_of_one_stable_material_do_not_contradict():
     assert not any("contradict" in warning for warning in posterior.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "values"), [("ogden-1", [0.02, -12.0]), ("yeoh", [0.01, 0.02, 0.1])])
 def test_laws_of_tension_and_compression_that_differ_do_not_contradict(law, values):
     material = tq.materials()[law]()
@@ -142,6 +144,7 @@ def test_laws_of_tension_and_compression_that_differ_do_not_contradict(law, valu
     assert tq.fit(tests).model.fitted_errors.reconciling_stability is None
 
 
+@pytest.mark.slow
 def test_a_discrepancy_by_name_and_tolerances_of_the_user_are_kept_where_tests_contradict():
     tests = compressed_and_sheared(8.0)
     assert tq.fit(tests, discrepancy="log+hencky").model.discrepancy.name == "log+hencky"
@@ -156,6 +159,7 @@ def test_a_saved_fit_still_says_that_its_tests_contradict(contradictory, tmp_pat
     assert loaded.warnings[0] == contradictory.warnings[0]
 
 
+@pytest.mark.slow
 def test_what_was_asked_for_is_kept_in_contradictory_tests_of_one_specimen():
     tests = [test.labelled(specimen="S") for test in compressed_and_sheared(8.0)]
     priors = {"c1": tq.HalfNormal(0.05), "c2": tq.HalfNormal(0.05)}
@@ -166,6 +170,7 @@ def test_what_was_asked_for_is_kept_in_contradictory_tests_of_one_specimen():
     assert "c2" not in model.symbols
 
 
+@pytest.mark.slow
 def test_each_contradictory_test_is_predicted_by_the_model_of_all(monkeypatch):
     used = []
 
@@ -186,6 +191,7 @@ def drifting(lag, count=80, sd=0.02, seed=4):
     return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * errors)
 
 
+@pytest.mark.slow
 def test_unknown_noise_is_autoregressive_where_the_data_are_more_probable_so():
     data = drifting(0.7)
     tolerances = tq.Tolerances("as-tested", length=0.01, slack=0.005)
@@ -219,12 +225,14 @@ def test_unknown_noise_is_autoregressive_where_the_data_are_more_probable_so():
     assert log_evidence(errors.lag) > best - 0.3
 
 
+@pytest.mark.slow
 def test_independent_errors_stay_so():
     models = [tq.fit(drifting(0.0, seed=seed)).model for seed in range(3)]
     assert [model.noise.name for model in models] == ["unknown"] * 3
     assert all(model.fitted_errors.fits <= 5 for model in models)  # a curve, and few of the five lags
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "count"), [("independent", 80), ("unknown", 11)])
 def test_noise_stays_independent_where_it_is_asked_for_or_points_are_few(noise, count):
     posterior = tq.fit(drifting(0.8, count), noise=noise)

@@ -58,6 +58,7 @@ def test_a_posterior_keeps_them_in_its_file(tmp_path):
     assert loaded.summary().equals(posterior.summary())
 
 
+@pytest.mark.slow
 def test_intervals_of_a_mean_of_four_specimens_hold_the_mean_of_all():
     """With the standard errors in 91 % at least, without them in 65 % at most: a bound fails in less than 3 %."""
     random, held = np.random.default_rng(5), np.zeros(2)

@@ -34,6 +34,7 @@ def test_a_summary_is_in_the_unit_of_the_measurements_or_the_one_asked_for(poste
         posterior.summary(unit="mm")
 
 
+@pytest.mark.slow
 def test_what_is_no_stress_stays_as_it_is():
     found = tq.fit({"stretch": STRETCH, "stress": STRESS}, unit="kPa", material="ogden-1", discrepancy="none")
     whole, other = found.summary(), found.summary(unit="MPa")

@@ -50,6 +50,7 @@ def ensemble(posterior):
     return posterior.ensemble(2048, admissible=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", BEYOND)
 def test_predictions_have_the_distribution_of_draws_as_materials(posterior, ensemble, mode):
     # Shares of 2048 quasi-random draws below an end of the band. Both are right within about 0.003 at the ends and
@@ -104,6 +105,7 @@ def test_the_band_of_another_mode_is_continuous_at_the_ends_of_the_ranges_of_all
         np.testing.assert_allclose((beyond[column] - inside[column]) / half_width(inside), 0, atol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerances", [None, tq.Tolerances(stretch=0.002)])
 def test_a_prediction_is_the_same_beside_others_farther_away(tolerances):
     posterior = fitted("yeoh", TRUTH, STRETCH, 3, tolerances=tolerances)
@@ -116,6 +118,7 @@ def test_a_prediction_is_the_same_beside_others_farther_away(tolerances):
             assert together[column][row] == pytest.approx(single[column], abs=0.03 * width)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_right_model_is_inside_the_band_to_twice_the_measured_strain(seed):
     # With the discrepancy, whose band of 95 % beyond the data holds more than that of a model that is right.
@@ -151,6 +154,7 @@ def test_three_times_as_far_as_the_data_nothing_is_negative_or_astronomical(of_s
     assert (band["high"] < 30 * band["median"]).all()
 
 
+@pytest.mark.slow
 def test_far_beyond_everything_is_finite(posterior, ensemble):
     band = posterior.predict([0.2, 3.0, 6.0], noise=False)
     assert np.isfinite(band.to_numpy()).all()
@@ -160,6 +164,7 @@ def test_far_beyond_everything_is_finite(posterior, ensemble):
 BIAXIAL = [[1.6, 1.3], [1.5, 1.0], [1.4, 1.2], [1.7, 0.9]]
 
 
+@pytest.mark.slow
 def test_both_stresses_of_draws_in_biaxial_tension_are_derivatives_of_their_energy(ensemble):
     points = np.array([*BIAXIAL, [1.5, 1.5], [1.2, 1.1]])
     for axis, path in enumerate(loading_mode("biaxial").paths):
@@ -182,6 +187,7 @@ def test_biaxial_tension_along_the_rays_of_other_modes_has_their_stress(posterio
     assert np.abs(second[list(ENDS)].to_numpy()).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_the_median_of_a_transverse_stress_is_near_that_of_the_draws(posterior, ensemble):
     # Across a ray the stress of a band grows as that along it, and that of draws as their energy's.
     for axis, path in enumerate(loading_mode("biaxial").paths):
@@ -223,6 +229,7 @@ def by(values, count):
     return np.split(values, values.shape[-1] // count, axis=-1)
 
 
+@pytest.mark.slow
 def test_drawn_curves_go_on_by_the_stated_formula_along_every_ray(curves):
     # The error b follows from the stress at one state beyond, and the stresses at two others from it.
     for V, x in curves:
@@ -281,6 +288,7 @@ def test_a_discrepancy_that_is_no_random_energy_goes_on_by_its_own_moments(discr
         assert all(draw.continuation is None for draw in posterior.ensemble(3, admissible=False))
 
 
+@pytest.mark.slow
 def test_the_model_alone_is_not_continued(posterior, ensemble):
     points = np.array([0.5, 1.3, 2.5])
     band = posterior.predict(points, noise=False, discrepancy=False)

@@ -34,6 +34,7 @@ def refitted(name, noise_sd, priors, out):
     return np.log(parts.weights @ norm.pdf(DATA.stress[out], mean[:, 0], np.sqrt(variance[:, 0])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tolerance", "noise_sd"),
     [
@@ -54,6 +55,7 @@ def test_leaving_one_out_is_refitting_without_it(name, tolerance, noise_sd):
     np.testing.assert_allclose(found.log_density[INSIDE], expected, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_a_sampled_posterior_leaves_out_a_measurement_at_rest():
     # There a material alone has no stress, so that no draw of its parameters explains it better than another.
     posterior = gallery.sampled_jointly()
@@ -116,6 +118,7 @@ def test_with_the_parameters_given_it_is_conditioning_of_the_full_covariance(nam
         assert found[i] == pytest.approx(joint - others, abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["none", "constant", "gp", "taylor+zero-modulus", "auto-sharp"])
 def test_the_joint_likelihood_is_that_of_the_full_covariance(name):
     solution = gallery.fit(DATA, discrepancy=name, noise_sd="unknown", tolerances="as-tested").solution

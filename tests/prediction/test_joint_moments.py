@@ -57,6 +57,7 @@ def test_a_parameter_and_a_stress_are_correlated_as_least_squares_says():
     np.testing.assert_allclose(covariance[:6], unit * 0.02**2 / (x @ x), rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["taylor", "log", "second-invariant", "hencky", "auto"])
 def test_beyond_the_data_roots_are_derivatives_of_draws(name):
     solution = tq.fit(data_of(), discrepancy=name, noise_sd=0.02).solution

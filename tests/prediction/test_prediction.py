@@ -140,6 +140,7 @@ def test_bad_requests_are_refused(stretch, prob):
         gallery.fit(DATA, discrepancy="none", noise_sd=0.2).predict(stretch, prob=prob)
 
 
+@pytest.mark.slow
 def test_the_band_at_a_stretch_does_not_depend_on_where_else_it_is_asked_for():
     stretch = np.linspace(0.9, 1.3, 20)
     data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, stretch, noise_sd=0.01, seed=1)

@@ -117,6 +117,7 @@ def test_modes_that_were_not_measured_are_predicted_within_the_measured_strains(
     np.testing.assert_allclose(view["high"], table["high"], rtol=2e-3, atol=0.05)
 
 
+@pytest.mark.slow
 def test_a_formulation_that_says_nothing_of_a_mode_has_no_view_of_it(posterior):
     process = tq.fit(posterior.model.experiment, **OPTIONS | {"discrepancy": "gp"})
     views = chart_data({"none": posterior, "gp": process}, "gp", KPA)["views"]

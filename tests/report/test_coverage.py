@@ -32,6 +32,7 @@ def made_up(settings):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [

@@ -38,6 +38,7 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     assert rows[-1][1:3] == ["", ""]
 
 
+@pytest.mark.slow
 def test_everything_is_written(study, tmp_path):
     write_result(design_result(study, study.settings), tmp_path)
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}

@@ -16,6 +16,7 @@ def first(posteriors, count):
     return dict(islice(zip(names, cycle(posteriors.values()), strict=False), count))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 7, *(pytest.param(count, marks=pytest.mark.slow) for count in (3, 4, 5, 6))])
 def test_every_column_of_panels_has_tick_labels_beneath_its_lowest_panel(specimen_study, count):
     figure = predictive_figure(first(specimen_study.posteriors, count), discrepancy=True, unit=KPA)
@@ -66,6 +67,7 @@ def test_a_marginal_bar_is_the_95_percent_interval_in_the_unit_of_the_file(speci
     assert axis.texts[0].get_text() == "true value 1200"
 
 
+@pytest.mark.slow
 def test_the_same_figure_is_saved_as_the_same_bytes(specimen_study, tmp_path):
     posteriors = first(specimen_study.posteriors, 2)
     for name in ("one", "two"):
@@ -109,6 +111,7 @@ def test_dollar_signs_in_a_name_are_shown_as_they_are(specimen_study, tmp_path):
     assert figure.axes[0].get_title(loc="left").startswith(name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("is_narrow", "width"), [(False, 1000), (True, 400)])
 def test_the_answer_has_the_width_of_a_page_and_letters_that_are_read_there(specimen_study, tmp_path, is_narrow, width):
     figure = answer_figure(specimen_study.posteriors["auto"], KPA, is_narrow=is_narrow)

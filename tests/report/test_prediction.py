@@ -89,6 +89,7 @@ def test_a_panel_shows_the_bands_in_the_unit_of_the_run(found):
     assert with_it.get_title("left").endswith(f"{inside} of 4 inside")
 
 
+@pytest.mark.slow
 def test_a_band_of_any_size_can_be_drawn(posterior):
     far = predicted(posterior, mode="equibiaxial", stretch=[1.0, 1.1, 1e9])
     figure = prediction_figure(far)

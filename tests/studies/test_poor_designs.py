@@ -19,6 +19,7 @@ DESIGNS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("noise", "seeds"),
     [

@@ -123,6 +123,7 @@ def test_without_a_discrepancy_there_is_one_prediction(fits):
     assert predicted(fits["none"], stretch=[1.2]).kinds == (False,)
 
 
+@pytest.mark.slow
 def test_measurements_are_scored_with_the_discrepancy_and_without(fits, planar):
     found = predicted(fits["auto"], data=planar)
     expected = fits["auto"].scores(planar, discrepancy=False)
@@ -177,6 +178,7 @@ def test_a_mode_of_two_controls_has_a_band_for_each_stress_equal_where_stretches
     assert found.data_set["low"].dims == ("discrepancy", "noise", "stress", "point")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["constrained-uniaxial", "simple-shear-normal"])
 def test_a_mode_of_one_control_and_two_stresses_is_predicted_where_calibrated(fits, mode):
     found = predicted(fits["auto"], mode=mode, points=5)
@@ -184,6 +186,7 @@ def test_a_mode_of_one_control_and_two_stresses_is_predicted_where_calibrated(fi
     assert len(found.table) == 10
 
 
+@pytest.mark.slow
 def test_measurements_of_two_controls_are_predicted_where_they_are(fits):
     test = tq.simulate("yeoh", TRUTH, [[1.1, 1.0], [1.1, 1.2], [1.3, 1.2]], noise_sd=NOISE_SD, mode="biaxial", seed=1)
     found = predicted(fits["auto"], data=test)

@@ -66,6 +66,7 @@ def test_each_discrepancy_gets_the_priors_of_its_own_parameters(file):
     assert "S" not in found.posteriors["none"].model.priors
 
 
+@pytest.mark.slow
 def test_all_discrepancies_are_fitted_and_those_that_do_not_apply_are_skipped_with_the_reason(file, offered):
     found = study(file, material="mooney-rivlin", noise_sd=1.0)
     assert next(iter(found.posteriors)) == "none"

@@ -33,6 +33,7 @@ def settings(tmp_path_factory):
     return SimulationSettings(run=str(folder / "runs" / "tissue"), case="bar", sizes=SIZES, draws=3, steps=2)
 
 
+@pytest.mark.slow
 def test_a_run_gives_its_posterior_and_the_fit_without_discrepancy(settings):
     found = load_posteriors(settings)
     assert found.fitted.model.discrepancy.name == "taylor"
@@ -40,6 +41,7 @@ def test_a_run_gives_its_posterior_and_the_fit_without_discrepancy(settings):
     np.testing.assert_array_equal(found.without.model.experiment.stress, found.fitted.model.experiment.stress)
 
 
+@pytest.mark.slow
 @pytest.mark.finite_elements
 def test_processes_give_the_same_forces_as_one_and_as_the_function(settings, tmp_path):
     posteriors = load_posteriors(settings)
@@ -57,6 +59,7 @@ def test_processes_give_the_same_forces_as_one_and_as_the_function(settings, tmp
         np.testing.assert_array_equal(forces[0][family], plain[family])
 
 
+@pytest.mark.slow
 @pytest.mark.finite_elements
 def test_what_is_done_is_not_done_again(settings, tmp_path):
     posteriors, told = load_posteriors(settings), []

@@ -40,6 +40,7 @@ def is_running(pid):
         return False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_workers_end_with_the_process_that_started_them(tmp_path, sign):
     main = subprocess.Popen(
@@ -95,6 +96,7 @@ def test_workers_that_are_killed_again_and_again_end_in_one_message(tmp_path):
         run_tasks([Number(1)], carry_out, tmp_path, pool=pool)
 
 
+@pytest.mark.slow
 def test_a_dask_scheduler_that_is_lost_is_one_message(tmp_path):
     pytest.importorskip("distributed")
     address = tmp_path / "scheduler.json"
@@ -167,6 +169,7 @@ def queue(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_workers_are_jobs_of_slurm_and_end_with_the_campaign(queue):
     """With the job script of dask-jobqueue, a stand-in for SLURM, and the work done in the jobs."""
     pytest.importorskip("dask_jobqueue")

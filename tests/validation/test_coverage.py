@@ -73,6 +73,7 @@ def test_families_that_the_library_has_are_the_librarys(mode):
     assert best(Ogden2(), (np.zeros(2), np.tile(exponents, (2, 1))), stress) < 1e-10
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_workers(tmp_path):
     settings = small()
     contents = []
@@ -202,6 +203,7 @@ def test_the_right_model_covers_as_often_as_it_says(tmp_path, replicates):
     assert 0.95 - chance < row["coverage"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("replicates", "families", "least"),
     [
@@ -333,6 +335,7 @@ def test_unseen_stretches_end_where_an_invariant_leaves_the_measured_range(mode)
     assert max(one - first, other - second) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("replicates", slow_but([100], [100, 200]))
 def test_predictions_of_the_right_model_hold_new_data_and_unseen_stress(tmp_path, replicates):
     # A neo-Hookean material fitted as one: posteriors, each of which holds all of a mode's stress or none.
@@ -349,6 +352,7 @@ def test_predictions_of_the_right_model_hold_new_data_and_unseen_stress(tmp_path
     assert unseen["error"] == pytest.approx(relative, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_shares_and_errors_of_predictions_are_those_of_the_posteriors_own_bands():
     settings = small(
         families=["yeoh"], formulations=["auto", "gp"], replicates=1, predictive=True, unseen=["equibiaxial"]

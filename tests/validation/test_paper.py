@@ -74,6 +74,7 @@ def test_the_table_has_every_range_and_formulation(study):
     assert all(cell.data_sets == 3 for cell in study.cells)
 
 
+@pytest.mark.slow
 def test_every_announced_step_is_taken(one_range):
     steps = []
     settings = PaperSettings(points=6, replicates=2)

@@ -33,6 +33,7 @@ def settings_of(**changes):
     return SbcSettings.model_validate({"formulations": ["constant"], "noise": "known", "replicates": 20} | changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeats", slow_but([400], [400, 1500]))
 @pytest.mark.parametrize("test", [shape_p_value, spread_p_value])
 def test_the_tests_have_the_size_that_they_say(test, repeats):
@@ -91,6 +92,7 @@ def test_parameters_are_drawn_from_their_priors_and_data_from_the_model(formulat
         assert np.mean(left) == pytest.approx(1.0, abs=4.5 * np.std(left) / 20)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "replicates",
     [20, pytest.param(40, marks=pytest.mark.slow), pytest.param(150, marks=pytest.mark.statistical)],
@@ -113,6 +115,7 @@ def test_noise_told_to_be_less_than_it_is_is_caught(monkeypatch):
     assert of_c10["spread"].min() > 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("replicates", slow_but([20], [20, 60]))
 def test_results_do_not_depend_on_workers_and_are_streamed(tmp_path, replicates):
     settings = settings_of(formulations=["none", "zero-modulus"], replicates=replicates)

@@ -39,6 +39,7 @@ def test_without_errors_the_tests_are_the_closed_form(truth):
         assert test.stress == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_errors_have_the_sizes_of_the_estimand():
     """Factors of 400 specimens: within four standard errors of an sd, 14 %."""
     settings = StructureStudySettings(noise=1e-9, points=12)

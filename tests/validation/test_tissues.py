@@ -131,6 +131,7 @@ def test_scores_are_those_of_a_normal_predictive_distribution():
     assert scores["score"] == pytest.approx(np.mean(2 * 1.9599640 * spread + 40 * beyond) / size, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_benchmark_resumes_and_its_summary_averages_predictions(folder, tmp_path):
     settings = TissueSettings(folder=str(folder), protocols=("specimens", "tests"), formulations=("none",), points=5)
     target = tmp_path / "out"

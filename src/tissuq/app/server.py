@@ -103,6 +103,7 @@ def _socket(port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((LOOPBACK, port))
+        listening.listen()  # at once, so that a browser that is quick waits and is not refused
     except OSError as error:
         listening.close()
         raise InputError(

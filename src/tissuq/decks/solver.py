@@ -150,8 +150,8 @@ class CalculiXSolver(Solver):
     def problem(self, folder: Path, job: str, status: int, said: str) -> str:
         if "Job finished" in said and not status:
             return ""
-        errors = re.findall(r"\*ERROR[:\s]*(.+)", said)
-        return errors[-1].strip() if errors else f"it ended with status {status} and did not finish"
+        errors = re.findall(r"\*ERROR[:\s]*(.+(?:\n {6,}[^\s*].*)*)", said)  # with the lines in which it goes on
+        return " ".join(errors[-1].split()) if errors else f"it ended with status {status} and did not finish"
 
     def last_time(self, folder: Path, job: str) -> float:
         """Return the last total time in the .sta file: CalculiX writes the increment that failed into the .frd, too.

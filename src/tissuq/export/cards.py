@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -105,8 +106,10 @@ class CardSettings:
             raise InputError("the order belongs to a law: give the law as well, such as polynomial or ogden.")
         if self.number < 1:
             raise InputError(f"the number of a material in a model is 1 or more, not {self.number}.")
-        if not (self.name.isascii() and self.name.replace("_", "").replace("-", "").isalnum() and len(self.name) <= 40):
-            raise InputError(f"'{self.name}' cannot name a material: use up to 40 letters, digits, _ and -.")
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", self.name):
+            raise InputError(
+                f"'{self.name}' cannot name a material: use up to 40 letters, digits, _ and -, a letter first."
+            )
 
     @property
     def factor(self) -> float:

@@ -18,7 +18,7 @@ Flags = NDArray[np.bool_]
 LARGEST_STRETCH = 10.0
 """Stretch, or one over it, beyond which no range is followed."""
 ROUNDING = 1e-9
-"""Difference of strains, and of invariants over the largest measured, that is none."""
+"""Difference of strains, or share of the largest measured invariants, that is none."""
 
 
 def invariants(states: States) -> tuple[FloatArray, FloatArray]:
@@ -68,10 +68,10 @@ class MeasuredStates:
         strains = tuple((factor**0.5 * low, factor**0.5 * high) for low, high in self.strains)
         return MeasuredStates(factor * self.I1, factor * self.I2, strains)
 
-    def contain(self, states: States) -> Flags:
-        """Return which states (n,) are among them."""
-        I1, I2 = invariants(states)
-        inside = (I1 <= self.I1 * (1 + ROUNDING)) & (I2 <= self.I2 * (1 + ROUNDING))
+    def contain(self, states: States, rounding: float = ROUNDING) -> Flags:
+        """Return which states (n,) are among them, where invariants may be larger by such a share."""
+        first, second = invariants(states)
+        inside = (first <= self.I1 * (1 + rounding)) & (second <= self.I2 * (1 + rounding))
         if self.strains:
             low, high = np.array(self.strains).T
             strains = states.axis_strains[0]
@@ -88,5 +88,5 @@ def farthest_stretch(mode: LoadingMode, measured: MeasuredStates, sign: int) -> 
     for _ in range(60):
         middle = 0.5 * (low + high)
         states = mode.paths[0].at(mode.excursion([sign * middle]))  # the same on every path
-        low, high = (middle, high) if measured.contain(states)[0] else (low, middle)
+        low, high = (middle, high) if measured.contain(states, rounding=0.0)[0] else (low, middle)
     return float(mode.excursion(sign * low))

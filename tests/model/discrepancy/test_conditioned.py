@@ -94,6 +94,7 @@ def test_orthogonal_draws_have_no_integral_with_the_stresses_of_the_material(mat
         assert np.abs(simpson(paths.T * stress, x=line)).max() < 1e-5 * size  # roots of rounding errors of 1e-16
 
 
+@pytest.mark.slow
 def test_the_least_squares_material_of_an_orthogonal_draw_is_zero():
     line = np.linspace(*ENDS, 2001)
     path = drawn(adapted("gp-orthogonal"), line, 0.5, count=1)[:, 0]

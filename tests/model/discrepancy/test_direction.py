@@ -119,6 +119,7 @@ def directed():
     return tq.fit(sheet(2e-4, 0.02), tolerances="specimen")
 
 
+@pytest.mark.slow
 def test_a_stiffer_axis_is_found_and_other_protocols_are_predicted(directed):
     assert directed.assess().direction > 0.95
     assert "preferred direction with a probability of" in " ".join(directed.assess().sentences)
@@ -137,6 +138,7 @@ def test_a_stiffer_axis_is_found_and_other_protocols_are_predicted(directed):
         assert errors["directed"] < 0.4 * errors["isotropic"]
 
 
+@pytest.mark.slow
 def test_a_sheet_that_is_the_same_along_both_axes_has_hardly_a_direction():
     posterior = tq.fit(sheet(2e-4, 0.0), tolerances="specimen")
     assert posterior.assess().direction < 0.3
@@ -150,6 +152,7 @@ def test_draws_of_a_material_with_a_direction_are_refused(directed):
         directed.ensemble(4)
 
 
+@pytest.mark.slow
 def test_a_saved_fit_keeps_its_direction(directed, tmp_path):
     directed.save(tmp_path / "fit.nc")
     assert tq.Posterior.load(tmp_path / "fit.nc").assess().direction == pytest.approx(directed.assess().direction)
@@ -164,6 +167,7 @@ def test_predictions_far_beyond_the_data_stay_finite_and_open(directed):
     assert width[-1] < 100
 
 
+@pytest.mark.slow
 def test_stability_does_not_ask_a_directed_material_for_greater_stress_along_greater_stretch(directed):
     assert min(directed.assess().stable.values()) > 0.9
 
