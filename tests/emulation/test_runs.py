@@ -252,6 +252,19 @@ def test_outputs_of_the_opposite_sign_are_refused_after_the_first_runs(tmp_path)
     assert not (tmp_path / "runs").exists()
 
 
+def test_runs_that_were_kept_stay_where_measurements_have_the_opposite_sign(tmp_path):
+    measured, folder = neo_hooke({"C10": 1.0}), tmp_path / "runs"
+
+    def force(parameters):
+        return neo_hooke(parameters)
+
+    tq.calibrate(DEPTH, measured, force, PRIORS, noise_sd=0.01, runs=8, folder=folder)
+    before = (folder / "batch-0" / "tasks.jsonl").read_bytes()
+    with pytest.raises(InputError, match="opposite signs"):
+        tq.calibrate(DEPTH, -measured, force, PRIORS, noise_sd=0.01, runs=8, folder=folder)
+    assert (folder / "batch-0" / "tasks.jsonl").read_bytes() == before
+
+
 @pytest.mark.slow
 def test_a_kept_run_is_told_of_once(tmp_path):
     told = []

@@ -273,6 +273,7 @@ def in_modes(moduli, modes, noise_sd=NOISE_SD):
     }
 
 
+@pytest.mark.slow
 def test_tests_of_a_specimen_in_several_modes_are_fitted_together():
     """Neo-Hookean stresses are C10 times a known curve: least squares over all of a specimen's tests."""
     tests = in_modes(MODULI, [("uniaxial", "planar"), ("simple-shear",), ("planar", "planar", "uniaxial")], 0.01)

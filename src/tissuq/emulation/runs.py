@@ -18,6 +18,7 @@ from tissuq.errors import InputError
 from tissuq.parameters.priors import Prior
 
 __all__ = [
+    "FIRST_RUNS",
     "EmulatorCheck",
     "ForwardRun",
     "ForwardRuns",

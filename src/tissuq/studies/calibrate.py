@@ -199,6 +199,7 @@ class _Runs:
         batch = next(self.batches)
         batch_folder = self.folder / f"batch-{batch}"
         batch_folder.mkdir(exist_ok=True)
+        is_begun = (batch_folder / RESULTS).exists()
         _forget_failures(batch_folder / RESULTS)
         run = partial(run_tasks, carry_out=carry_out, folder=batch_folder, pool=self.pool)
         first = [] if batch else tasks[: self.first]
@@ -208,7 +209,7 @@ class _Runs:
             try:
                 check_first_runs(first_runs, self.problem.measured, self.problem.quantities)
             except InputError:
-                if not first_runs.failed.all():  # what the solver wrote of failed runs is to be looked at
+                if not (is_begun or first_runs.failed.all()):  # what solvers wrote of failed runs is to be looked at
                     (batch_folder / RESULTS).unlink()
                 raise
         reported = {task.label for task in first}
