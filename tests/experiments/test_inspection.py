@@ -139,6 +139,18 @@ def test_a_biaxial_test_read_as_uniaxial_is_doubted(tmp_path):
     assert "carries force" not in notes(tq.inspect(path, **file.options))
 
 
+@pytest.mark.parametrize(("ratio", "is_doubted"), [(-1.0, True), (0.0, True), (0.5, False), (0.3, False)])
+@pytest.mark.parametrize("heading", ["stretch y", "strain y [%]", "strain yy"])
+def test_a_stretch_of_the_other_axis_that_is_not_free_is_doubted(tmp_path, ratio, is_doubted, heading):
+    along = np.linspace(1, 1.3, 20)
+    across = along**-ratio
+    column = {"stretch y": across, "strain y [%]": 100 * (across - 1), "strain yy": across - 1}[heading]
+    rows = "".join(f"{a:.6f},{b:.6f},{1e3 * (a - a**-2):.6f}\n" for a, b in zip(along, column, strict=True))
+    (tmp_path / "x.csv").write_text(f"stretch x,{heading},stress x (kPa)\n{rows}")
+    text = notes(tq.inspect(tmp_path / "x.csv", axis="x", mode="uniaxial"))
+    assert ("does not become narrower" in text) is is_doubted
+
+
 def test_compression_after_tension_from_the_reference_is_no_unloading(tmp_path):
     text = "stretch,stress_kPa\n"
     for end in (1.1, 0.9):

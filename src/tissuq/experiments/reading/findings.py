@@ -8,13 +8,16 @@ from itertools import chain
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from tissuq.errors import InputError
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
+from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES
+from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["STRESS_AT_REST", "data_warnings"]
@@ -33,6 +36,9 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 SAME_RATIO = np.radians(5.0)
 """Angle between the strains of two axes within which cycles have the same ratio of them."""
+MIN_CONTRACTION = 0.2
+"""Smallest strain across over that along the axis, of the other sign, of a specimen that is free there: 0.5 of an
+isotropic one."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
 STRESS_AT_REST = "the stress is already"
@@ -178,21 +184,45 @@ def _other_axis(reading: Reading, number: int) -> str:
     axis, _ = on_axis(table.quantities[choice.deformation])
     if not axis or not isinstance(reading.experiment.mode, Uniaxial):
         return ""
-    names = map(on_axis, table.quantities)
-    is_across = [name_axis not in ("", axis) and name in ROLES["force"] for name_axis, name in names]
-    if not any(is_across):
-        return ""
-    column = is_across.index(True)
-    along, across = (float(np.abs(numbers).max()) for numbers in table.numbers([choice.stress, column]))
-    if across < NOTABLE_SHARE * along:
+    names = enumerate(map(on_axis, table.quantities))
+    across = [(column, name) for column, (name_axis, name) in names if name_axis not in ("", axis)]
+    forces = (column for column, name in across if name in ROLES["force"])
+    strains = (column for column, name in across if name in ROLES["stretch"] | ROLES["strain"])
+    if (column := next(forces, None)) is not None and _is_loaded(table, choice.stress, column):
+        doubt = f"{table.label(column)} carries force, too, so the test is not uniaxial"
+    elif (column := next(strains, None)) is not None and _is_held(reading, number, column):
+        doubt = f"{table.label(column)} does not become narrower as in a uniaxial test"
+    else:
         return ""
     return (
-        f"column {table.label(column)} carries force, too, so the test is not uniaxial: give --mode biaxial to read "
-        "both axes, or equibiaxial with one of them if both were stretched alike."
+        f"column {doubt}: give --mode biaxial to read both axes, planar if this one was held, or equibiaxial with one "
+        "of them if both were stretched alike."
     )
 
 
+def _is_loaded(table: Table, stress: int, column: int) -> bool:
+    """Tell whether a column of forces across is a notable share of those along the axis."""
+    along, across = (float(np.abs(numbers).max()) for numbers in table.numbers([stress, column]))
+    return across >= NOTABLE_SHARE * along
+
+
+def _is_held(reading: Reading, number: int, column: int) -> bool:
+    """Tell whether a column of stretches or strains across hardly falls while those along the axis rise."""
+    table, along = reading.used.table, np.log(reading.used.stretch[number])
+    try:
+        (values,) = table.numbers([column])
+    except InputError:
+        return False
+    values = values / (100 if table.unit(column) == "%" else 1)
+    stretch = values if on_axis(table.quantities[column])[1] in ROLES["stretch"] else 1 + values
+    if stretch.min() <= 0 or np.abs(along).max() < LEAST_STRAIN:
+        return False
+    ratio, error = poisson_ratio(along, np.log(stretch))
+    return ratio + STANDARD_ERRORS * error < MIN_CONTRACTION
+
+
 CHECKS: tuple[Callable[[Reading, int], str], ...] = (
+    _other_axis,
     _size,
     _stretch_size,
     _cycles,
@@ -200,5 +230,4 @@ CHECKS: tuple[Callable[[Reading, int], str], ...] = (
     _reference,
     _diameter,
     _many,
-    _other_axis,
 )

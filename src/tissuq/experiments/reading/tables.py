@@ -283,7 +283,8 @@ def _no_table(file: str, content: Lines) -> InputError:
     line, text = content[-1]
     return InputError(
         f"{file} holds no rows of numbers: no line has numbers in two columns. The last line "
-        f"with text ({line}) reads '{text.strip()[:80]}'. Expected a column of stretches and one of stresses."
+        f"with text ({line}) reads '{text.strip()[:80]}'. Expected two columns of numbers or more, such as stretches "
+        "and stresses."
     )
 
 

@@ -74,7 +74,9 @@ def _content(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {error}.") from error
     if not content.strip():
-        raise InputError(f"{path} is empty; expected a table with a column of stretches and one of stresses.")
+        raise InputError(
+            f"{path} is empty; expected a table with two columns of numbers or more, such as stretches and stresses."
+        )
     return content
 
 
