@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from forward_models import DEPTH, neo_hooke
 from tissuq.emulation import FileForward, gathered
-from tissuq.emulation.forward import CallableForward, SeveralModels, as_forward
+from tissuq.emulation.forward import CallableForward, SeveralModels, UnreadableError, as_forward
 from tissuq.emulation.problem import pose
 from tissuq.emulation.runs import ForwardRun, carry_out
 from tissuq.errors import ConvergenceError, InputError
@@ -274,3 +274,13 @@ def test_a_kept_run_is_told_of_once(tmp_path):
             noise_sd=0.01, runs=8, folder=tmp_path / "runs", step=lambda *result: told.append(result),
         )  # fmt: skip
     assert told == [(f"run {number}", is_new) for is_new in (True, False) for number in range(1, 9)]
+
+
+@pytest.mark.parametrize(("problem", "kind"), [("", UnreadableError), ("it diverged", ConvergenceError)])
+def test_where_a_solver_ended_early_it_may_have_ended_anywhere(problem, kind):
+    """A control that goes back is a wrong sign or quantity, but for that of a run that failed."""
+    model = tq.DeckForward("block.inp", "TISSUE", "neo-hookean", "RF2@TOP", (0.7, 1.2), along="U2@TOP")
+    times, depth = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.2, 0.2])
+    curves = {quantity.name: (times, depth) for quantity in model.quantities}
+    with pytest.raises(kind):
+        model._at(np.array([0.1, 0.5]), "", curves, problem)

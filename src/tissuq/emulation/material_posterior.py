@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.stability import calibrated_range
+from tissuq.assessment.stability import measured_range
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.sampling import SampledPosterior
 from tissuq.errors import InputError
@@ -117,7 +117,7 @@ def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float
     experiment = _experiment(law, np.array([values]), loading_mode(mode), stretch)
     noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
     model = StatisticalModel(experiment, law, NoDiscrepancy(), noise)
-    ranges = {each.name: calibrated_range(model, each) for each in curve_modes()}
+    ranges = {each.name: measured_range(experiment, each) for each in curve_modes()}
     return Ensemble((EnergyDraw(0, ((law, values),), None),), model, (), 1, ranges)
 
 

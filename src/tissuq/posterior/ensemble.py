@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment.stability import calibrated_range, stability_modes, stable_draws
+from tissuq.assessment.stability import calibrated_range, measured_range, stability_modes, stable_draws
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.headed_tables import headed
@@ -229,7 +229,7 @@ class Ensemble(Sequence[EnergyDraw]):
                 f"{', '.join(self.ranges)}."
             )
         if stretch is None:
-            at = np.linspace(*calibrated_range(self.model, loading), PLOT_POINTS)
+            at = np.linspace(*measured_range(self.model.experiment, loading), PLOT_POINTS)
         else:
             at = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
         with panels(ax, 1) as drawn:
