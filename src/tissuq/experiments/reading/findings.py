@@ -8,7 +8,6 @@ from itertools import chain
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from tissuq.errors import InputError
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
@@ -17,7 +16,7 @@ from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES
-from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio
+from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["STRESS_AT_REST", "data_warnings"]
@@ -209,11 +208,9 @@ def _is_loaded(table: Table, stress: int, column: int) -> bool:
 def _is_held(reading: Reading, number: int, column: int) -> bool:
     """Tell whether a column of stretches or strains across hardly falls while those along the axis rise."""
     table, along = reading.used.table, np.log(reading.used.stretch[number])
-    try:
-        (values,) = table.numbers([column])
-    except InputError:
+    values = readable_shares(table, column)
+    if values is None:
         return False
-    values = values / (100 if table.unit(column) == "%" else 1)
     stretch = values if on_axis(table.quantities[column])[1] in ROLES["stretch"] else 1 + values
     if stretch.min() <= 0 or np.abs(along).max() < LEAST_STRAIN:
         return False

@@ -10,7 +10,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["poisson_ratio", "volume_step"]
+__all__ = ["poisson_ratio", "readable_shares", "volume_step"]
 
 LATERAL = re.compile(r"transvers|\blateral|\bradial|\bquer|попереч|横向")
 STRETCH = re.compile(r"stretch|lambda|λ|streckung")
@@ -71,6 +71,15 @@ def poisson_ratio(along: Column, across: Column) -> tuple[float, float]:
     return -slope, float(np.sqrt(scatter / squares * len(along) / rows))
 
 
+def readable_shares(table: Table, number: int) -> Column | None:
+    """Return a column (n,) of stretches or strains, of which percentages are shares; None where a cell is faulty."""
+    try:
+        (values,) = table.numbers([number])
+    except InputError:
+        return None
+    return values / (100 if table.unit(number) == "%" else 1)
+
+
 def _lateral(table: Table, number: int, along: Column) -> tuple[int, Column] | None:
     """Return a column with the lateral stretches (n,) that it holds, if it is one; those with faulty cells are not.
 
@@ -80,9 +89,7 @@ def _lateral(table: Table, number: int, along: Column) -> tuple[int, Column] | N
     is_stretch, is_strain = bool(STRETCH.search(quantity)), bool(STRAIN.search(quantity))
     if not LATERAL.search(quantity) or not (is_stretch or is_strain) or unit not in ("", "1", "-", "%", "mm/mm"):
         return None
-    try:
-        (values,) = table.numbers([number])
-    except InputError:
+    values = readable_shares(table, number)
+    if values is None:
         return None
-    values = values / (100 if unit == "%" else 1)
     return number, values if is_stretch else 1 - np.sign(values @ along) * values
