@@ -13,6 +13,7 @@ from tissuq.errors import InputError
 from tissuq.validation.tissues import TissueSettings, read_corpus, run_benchmark, summarise_tissues
 from tissuq.validation.tissues.benchmark import carry_out, predicted, tasks_of
 from tissuq.validation.tissues.protocols import PROTOCOLS
+from tissuq.validation.tissues.settings import RIVALS
 
 BIAXIAL = """mode,stretch,stress_MPa,stretch_2,stress_2_MPa,direction,specimen
 """
@@ -187,3 +188,31 @@ def test_one_mode_predicted_from_another_compares_the_moduli():
     shear = next(r for t in tasks_of(settings) if (r := carry_out(settings, t))["mode"] == "simple-shear")
     assert shear["modulus_of_predicted"] == pytest.approx(2 * C10, rel=0.02)
     assert result["modulus_low"] < result["modulus_high"]
+
+
+def test_an_embedded_error_is_that_of_a_stiffness_that_is_random_at_every_measurement(folder):
+    """Against the likelihood written down: y ~ N(C10 x, (s C x + noise)^2), C near C10, summed over a grid of all."""
+    settings = TissueSettings(folder=str(folder), sets=("gel-axial",), protocols=("tests",), formulations=("embedded",))
+    row = carry_out(settings, tasks_of(settings)[0])
+    split = next(iter(PROTOCOLS["tests"](read_corpus(folder)[0].tests)))
+    alone = tq.fit(split.fitted, discrepancy="none", noise_sd="proportional")
+    assert row["half_width"] == pytest.approx(predicted(alone, split.predicted)["half_width"], rel=1e-9)
+
+    generator = np.random.default_rng(8)
+    stretch = np.linspace(1.02, 1.6, 60)
+    x = 2 * (stretch - stretch**-2)
+    y = (0.1 + 0.004 * generator.standard_normal(60)) * x + 2e-4 * generator.standard_normal(60)
+    posterior = tq.fit(tq.Experiment("uniaxial", stretch, y), **RIVALS["embedded"])
+    modulus, share, noise = np.linspace(0.097, 0.103, 201), np.geomspace(0.005, 0.5, 81), np.geomspace(1e-6, 0.01, 81)
+    variance = (0.1 * share[:, None, None] * x + noise[:, None]) ** 2
+    log_prior = (posterior.model.priors["noise_share"].log_density(share) + np.log(share))[:, None]
+    log_prior = log_prior + posterior.model.priors["noise_sd"].log_density(noise) + np.log(noise)
+    log_prior -= 0.5 * np.log(variance).sum(axis=-1)
+    logs = -0.5 * np.einsum("mi,abi->mab", (y - modulus[:, None] * x) ** 2, 1 / variance) + log_prior
+    weights = np.exp(logs - logs.max()).sum(axis=(1, 2))
+    weights /= weights.sum()
+    mean = weights @ modulus
+    sd = np.sqrt(weights @ (modulus - mean) ** 2)
+    c10 = posterior.marginals["C10"]
+    assert c10.mean == pytest.approx(mean, abs=0.1 * sd)
+    assert c10.sd == pytest.approx(sd, rel=0.1)

@@ -85,7 +85,7 @@ class TissueOptions(Settings):
         name="protocol",
     )
     formulations: tuple[str, ...] = option(
-        ("auto", "none"), "Discrepancy; repeat for more [auto, none].", name="discrepancy"
+        ("auto", "none"), "Discrepancy, or embedded; repeat for more [auto, none].", name="discrepancy"
     )
     material: str = option("neo-hookean", "The material that is fitted.")
     tolerances: SizesOfErrors = option(

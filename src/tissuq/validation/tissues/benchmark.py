@@ -21,7 +21,7 @@ from tissuq.prediction.scores import interval_score, root_mean_square
 from tissuq.studies.stream import Campaign
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
 from tissuq.validation.tissues.protocols import ESTIMAND_OF_PROTOCOL, PROTOCOLS, Split
-from tissuq.validation.tissues.settings import TissueSettings
+from tissuq.validation.tissues.settings import RIVALS, TissueSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,8 +100,9 @@ def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
         "predicted": target.name,
         "mode": target.mode.name,
     }
-    options: dict[str, Any] = {"material": settings.material, "discrepancy": task.formulation}
-    if discrepancy_named(task.formulation).is_energy:  # others take up errors of the test themselves
+    rival = RIVALS.get(task.formulation)
+    options: dict[str, Any] = {"material": settings.material} | (rival or {"discrepancy": task.formulation})
+    if not rival and discrepancy_named(task.formulation).is_energy:  # others take up errors of the test themselves
         estimand = ESTIMAND_OF_PROTOCOL[task.protocol]
         options["tolerances"] = Tolerances(estimand if settings.tolerances is None else "", **settings.tolerances or {})
     try:

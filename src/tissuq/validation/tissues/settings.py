@@ -10,7 +10,15 @@ from tissuq.studies.campaign_settings import TissueOptions
 from tissuq.studies.settings import looked_up
 from tissuq.validation.tissues.protocols import PROTOCOLS
 
-__all__ = ["TissueSettings"]
+__all__ = ["RIVALS", "TissueSettings"]
+
+RIVALS = {"embedded": {"discrepancy": "none", "noise_sd": "proportional"}}
+"""What is fitted under names that are no discrepancy.
+
+Embedded: the stiffness of the law is random, anew at every measurement. So the stress of a law that is linear in its
+stiffness has an independent error in proportion to it, as with proportional noise: the independent normal form of
+Sargsyan, Huan & Najm (2019, arXiv:1801.06768), which Andres Arcones et al. (2026, Data-Centric Engineering) extend.
+"""
 
 
 class TissueSettings(TissueOptions):
@@ -25,7 +33,7 @@ class TissueSettings(TissueOptions):
     protocols : tuple of str
         Which tests are predicted from which (`PROTOCOLS`).
     formulations : tuple of str
-        Discrepancies of the fits.
+        Discrepancies of the fits, or ``"embedded"`` (`RIVALS`).
     material : str
     tolerances : dict of str to float, optional
         Standard deviations of errors of the tests (`tissuq.Tolerances`, stresses in MPa); without it those of what is
@@ -51,7 +59,8 @@ class TissueSettings(TissueOptions):
     @classmethod
     def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            looked_up(discrepancy_named, name)
+            if name not in RIVALS:
+                looked_up(discrepancy_named, name)
         return names
 
     @field_validator("material")
