@@ -18,7 +18,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # as many processes as cores: more thre
 
 os.environ.setdefault("TISSUQ_PROGRESS", "off")  # lines that depend on how fast the machine is
 
-MEMORY_MAPS, MOST_MAPS = Path("/proc/self/maps"), 20_000
+MEMORY_MAPS, MOST_MAPS = Path("/proc/self/maps"), 12_000
 """What a process has mapped (on Linux, where 65530 are allowed), and from how many on compiled functions are let go."""
 
 SLOW_EXAMPLES = {"fit_population", "patient", "sample_nuts", "sample_smc"}
@@ -42,9 +42,13 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def few_maps():
-    """Let go of compiled functions after a module that has left many: each takes some pieces of memory."""
+def little_memory(request: pytest.FixtureRequest):
+    """Let go, after a module, of what its functions remember, and of compiled functions where these are many."""
     yield
+    if isinstance(request.node, pytest.Module):
+        for function in vars(request.module).values():
+            if getattr(function, "__module__", "") == request.module.__name__ and hasattr(function, "cache_clear"):
+                function.cache_clear()
     if "jax" in sys.modules and MEMORY_MAPS.exists() and MEMORY_MAPS.read_bytes().count(b"\n") > MOST_MAPS:
         sys.modules["jax"].clear_caches()
         gc.collect()

@@ -84,6 +84,13 @@ def _dask_pool(scheduler: str) -> Iterator[Executor]:
     try:
         with client, client.get_executor(retries=5) as pool:
             yield pool
+    except RuntimeError as error:
+        if "deserialization" not in str(error):
+            raise
+        raise InputError(
+            f"the Dask scheduler at '{scheduler}' does not understand tasks of tissuq: install there the same versions "
+            "of Python, of tissuq and of its dependencies, and start it anew."
+        ) from error
     except (CancelledError, CommClosedError, KilledWorker) as error:
         raise InputError(
             f"the Dask scheduler at '{scheduler}' or its workers are lost ({type(error).__name__}). What is done is "
