@@ -108,6 +108,19 @@ def test_a_step_that_ends_in_time_takes_its_line_along(monkeypatch):
     assert [text.rpartition(" ")[2] for text in cancelled] == ["reading", "fitting", "writing"]
 
 
+def test_it_is_told_once_that_no_task_is_done_and_not_after_the_first(monkeypatch, capsys):
+    cancelled = []
+    monkeypatch.setattr(progress, "Timer", Endless)
+    monkeypatch.setattr(Endless, "cancel", lambda timer: cancelled.append(timer.arguments[0]))
+    with Monitor().campaign(4) as step:
+        assert cancelled == []
+        step("task 0", True)
+        assert cancelled == ["none of 4 tasks is done after 60 s"]
+    monkeypatch.setattr(progress, "Timer", Impatient)
+    with Monitor().campaign(4):
+        assert capsys.readouterr().err == "tissuq: none of 4 tasks is done after 60 s\n"
+
+
 def test_the_time_left_is_that_of_the_tasks_so_far(monkeypatch, capsys):
     clock = iter([0.0, *range(0, 1000, 20)])
     monkeypatch.setattr(progress, "monotonic", lambda: next(clock))

@@ -25,6 +25,8 @@ PATIENCE = 3.0
 """Seconds after which a step is told of where there is no terminal."""
 TASKS_APART = 10.0
 """Seconds between lines about the tasks of a campaign."""
+NONE_DONE = 60.0
+"""Seconds after which it is told that no task of a campaign is done: batch jobs may wait, or may have failed."""
 SWITCH = "TISSUQ_PROGRESS"
 """The environment variable that says ``off`` where such lines would be in the way."""
 
@@ -93,11 +95,14 @@ class Monitor:
         """
         self._begin(f"{total} tasks")
         self.tasks, self.tasks_done, computed, begun, last_told = total, 0, 0, monotonic(), monotonic()
-        with self._bar(total) as bar:
+        with self._bar(total) as bar, _Timed(self._say) as timed:
             shown = bar.add_task("", total=total)
+            if self._tells_lines:
+                timed.wait(f"none of {total} tasks is done after {NONE_DONE:.0f} s", NONE_DONE)
 
             def step(text: str, is_new: bool) -> None:
                 nonlocal computed, last_told
+                timed.stop()
                 self.tasks_done, computed = self.tasks_done + 1, computed + is_new
                 seconds_left = (monotonic() - begun) / computed * (total - self.tasks_done) if computed else None
                 bar.update(shown, description=f"{_left(seconds_left)}{text}", completed=self.tasks_done)
@@ -182,16 +187,17 @@ class _Timed:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stop()
+        self.stop()
 
-    def wait(self, text: str) -> None:
-        """Say a text, unless another comes within some seconds."""
-        self._stop()
-        self.timer = Timer(PATIENCE, self.say, [text])
+    def wait(self, text: str, seconds: float = PATIENCE) -> None:
+        """Say a text, unless another comes within some seconds, or it stops."""
+        self.stop()
+        self.timer = Timer(seconds, self.say, [text])
         self.timer.daemon = True
         self.timer.start()
 
-    def _stop(self) -> None:
+    def stop(self) -> None:
+        """Say nothing of what is waited with."""
         if self.timer is not None:
             self.timer.cancel()
 
