@@ -45,6 +45,13 @@ def test_few_places_have_their_means_and_the_slope_between():
     assert found.slope.tolist() == [4.0, 4.0, 4.0, 4.0]
 
 
+def test_places_that_hardly_differ_have_their_means_too():
+    place = np.repeat(1 + 1e-6 * np.arange(5), [4, 4, 5, 4, 4])
+    assert smoothed(place, np.repeat([1.0, 2.0, 2.0, 3.0, 3.0], [4, 4, 5, 4, 4])).stress.tolist() == pytest.approx(
+        np.repeat([1.0, 2.0, 2.0, 3.0, 3.0], [4, 4, 5, 4, 4]).tolist()
+    )
+
+
 @pytest.mark.slow
 def test_thousands_of_places_are_smoothed_in_groups():
     place = np.linspace(0.6, 2.0, 30_000)

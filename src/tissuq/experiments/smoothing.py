@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,16 +31,18 @@ class Smoothed:
 def smoothed(abscissa: FloatArray, stress: FloatArray) -> Smoothed:
     """Return a smoothing spline through stresses (n,) at abscissas (n,), or with few of them the means and their slope.
 
-    Generalised cross-validation chooses how smooth (SciPy).
+    Generalised cross-validation chooses how smooth (SciPy); where it cannot, as of abscissas that hardly differ, they
+    are as few.
     """
     knots, mean, count, group = _averaged(abscissa, stress)
-    if len(knots) < MIN_KNOTS:
-        slope = np.gradient(mean, knots) if len(knots) > 1 else np.zeros(1)
-        return Smoothed(mean[group], slope[group])
-    from scipy.interpolate import make_smoothing_spline
+    if len(knots) >= MIN_KNOTS:
+        from scipy.interpolate import make_smoothing_spline
 
-    spline = make_smoothing_spline(knots, mean, w=count)
-    return Smoothed(np.asarray(spline(abscissa)), np.asarray(spline.derivative()(abscissa)))
+        with suppress(ValueError):
+            spline = make_smoothing_spline(knots, mean, w=count)
+            return Smoothed(np.asarray(spline(abscissa)), np.asarray(spline.derivative()(abscissa)))
+    slope = np.gradient(mean, knots) if len(knots) > 1 else np.zeros(1)
+    return Smoothed(mean[group], slope[group])
 
 
 def scatter(abscissa: FloatArray, stress: FloatArray) -> float | None:
