@@ -46,10 +46,9 @@ def test_few_places_have_their_means_and_the_slope_between():
 
 
 def test_places_that_hardly_differ_have_their_means_too():
-    place = np.repeat(1 + 1e-6 * np.arange(5), [4, 4, 5, 4, 4])
-    assert smoothed(place, np.repeat([1.0, 2.0, 2.0, 3.0, 3.0], [4, 4, 5, 4, 4])).stress.tolist() == pytest.approx(
-        np.repeat([1.0, 2.0, 2.0, 3.0, 3.0], [4, 4, 5, 4, 4]).tolist()
-    )
+    copies = [4, 4, 5, 4, 4]
+    place, stress = np.repeat(1 + 1e-6 * np.arange(5), copies), np.repeat([1.0, 2.0, 2.0, 3.0, 3.0], copies)
+    assert smoothed(place, stress).stress.tolist() == pytest.approx(stress.tolist())
 
 
 @pytest.mark.slow
