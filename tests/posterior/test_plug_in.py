@@ -245,3 +245,10 @@ def test_no_correlation_is_longer_than_a_tenth_of_the_curve():
     bumps = 0.01 * np.sin(40 * smooth.stretch)
     wavy = tq.Experiment("uniaxial", smooth.stretch, smooth.stress + bumps)
     assert 0.5 < tq.fit(wavy, discrepancy="taylor").model.fitted_errors.lag <= np.exp(-1 / 8)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_independent_errors_below_the_resolution_that_is_assumed_stay_so(seed):
+    fine = drifting(0.0, seed=seed, sd=1e-4)  # the resolution is 0.002 of the largest stress
+    assert fine.stress.max() > 1
+    assert tq.fit(fine, discrepancy="taylor").model.noise.name == "unknown"

@@ -118,8 +118,10 @@ class ErrorEstimates:
 
         Only beside an energy discrepancy: without one, what looks like correlated errors is that of the material.
         Compared are few energies, each noise at the level that suits it best. A longer correlation than a share of the
-        curve is not tried: such errors are the smooth ones of the test. The log evidence is concave, nearly, in the
-        coordinate in which the lags are evenly spaced: the search ends where the gain can no longer be reached.
+        curve is not tried: such errors are the smooth ones of the test. Nor is any where noise is smaller than the
+        independent errors that are assumed beside it (the resolution of the load cell): a lag then corrects those. The
+        log evidence is concave, nearly, in the coordinate in which the lags are evenly spaced: the search ends where
+        the gain can no longer be reached.
         """
         fewest = min(map(len, model.experiment.curves))
         is_open = type(model.noise) is UnknownNoise and bool(model.energy_symbols) and self._sums_noise(model)
@@ -135,7 +137,8 @@ class ErrorEstimates:
             step = evidence - evidences[-1] if evidences else np.inf
             evidences.append(evidence)
             at_most = evidence + (LAG_COUNT - len(evidences)) * (step + 2 * LEVEL_ACCURACY)
-            if step < 0 or at_most < evidences[0] + MIN_LOG_EVIDENCE_GAIN:
+            is_assumed = len(evidences) == 1 and level < _assumed_level(model)
+            if step < 0 or at_most < evidences[0] + MIN_LOG_EVIDENCE_GAIN or is_assumed:
                 break
         fits = model.fitted_errors.fits + self._fits
         if max(evidences) < evidences[0] + MIN_LOG_EVIDENCE_GAIN:
@@ -262,6 +265,13 @@ def _pilot(model: StatisticalModel) -> StatisticalModel:
 def _curve_of(solution: Solution, model: StatisticalModel) -> tuple[FloatArray, FloatArray | None]:
     """Return the mean curve of a solution of the same data as a model, and its slopes where its errors need them."""
     return mean_curve_and_slopes(solution, CURVE_COMPONENTS, with_slopes=model.tolerances.need_slope)
+
+
+def _assumed_level(model: StatisticalModel) -> float:
+    """Return the root mean square of the independent errors that tolerances assume, MPa; zero where they do not."""
+    tests = model.fitted_errors.points_of(model.experiment)
+    variances = [model.tolerances.noise(points) ** 2 for points in tests]
+    return float(np.sqrt(np.concatenate(variances).mean())) if variances else 0.0
 
 
 def default_tolerances(model: StatisticalModel) -> Tolerances:
