@@ -183,7 +183,38 @@ def test_tables_in_which_time_goes_on_are_one_test(tmp_path):
         lines += rows_of(10 * (ramp() - 1)[part], 10 * neo_hookean(ramp())[part], time[part])
     (test,) = find_tests_in_file(written(tmp_path / "mts.txt", lines, "\t"), dimensions=SIZES)
     check([test.reading.experiment], ["mts"], [1.0])
-    assert "in which time goes on, read as one table" in test.reading.warnings[0]
+    assert "2 tables in lines 6 to 69 go on from one another, and are read as one" in test.reading.warnings[0]
+
+
+def pages(*parts, title=""):
+    lines = []
+    for number, part in enumerate(parts):
+        lines += [[f"{title} {number + 1}"]] if title else []
+        lines += [["stretch", "stress [kPa]"], *rows_of(ramp()[part], 1e3 * neo_hookean(ramp())[part])]
+    return lines
+
+
+def test_pages_of_one_ramp_are_one_test_to_the_last_row(tmp_path):
+    path = written(tmp_path / "a.csv", pages(slice(0, 20), slice(20, 40), slice(40, 59), slice(59, 60)))
+    (test,) = read_tests(path)
+    np.testing.assert_allclose(test.stretch, ramp(), atol=1e-6)
+    np.testing.assert_allclose(test.stress, neo_hookean(ramp()), atol=1e-6)
+    loading_and_unloading = written(tmp_path / "b.csv", pages(slice(0, 60), slice(None, None, -1)))
+    assert [test.size for test in read_tests(loading_and_unloading)] == [120]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        pages(slice(0, 60), slice(0, 60)),
+        [*pages(slice(0, 60)), *rows_of(ramp()[58::-1], 1e3 * neo_hookean(ramp())[58::-1]), *pages(slice(0, 60))],
+        pages(slice(0, 20), slice(40, 60)),
+        pages(slice(0, 30), slice(30, 60), title="Specimen"),
+    ],
+    ids=["anew", "anew after unloading", "with a gap", "with titles"],
+)
+def test_tables_that_begin_anew_are_several_tests(tmp_path, lines):
+    assert len(read_tests(written(tmp_path / "a.csv", lines))) == 2
 
 
 def test_a_word_among_the_numbers_is_a_bad_cell_and_no_second_table(tmp_path):

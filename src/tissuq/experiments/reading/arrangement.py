@@ -16,10 +16,12 @@ from tissuq.experiments.reading.layout import FEWEST_ROWS, MISSING, joined, like
 from tissuq.experiments.reading.table import Lines, Table
 from tissuq.experiments.units import looks_like_unit
 
-__all__ = ["blocks_of", "joined_in_time", "transposed_table"]
+__all__ = ["blocks_of", "joined_where_they_go_on", "transposed_table"]
 
 SAME, FAR = 0.1, 0.5
 """Share of the range of a column within which all blocks begin, and by which one of them goes back at a blank line."""
+MOST_STEPS = 2
+"""Largest steps of a column by which a table goes on from the one before at most."""
 TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
 """Names of a column of times."""
 FEWEST_VALUES = 4
@@ -120,26 +122,45 @@ def _begins_anew(numbers: NDArray[np.float64], row: int) -> bool:
     return bool(len(span) and is_same.all() and (np.abs(numbers[row] - numbers[row - 1]) >= FAR * span).any())
 
 
-def joined_in_time(tables: Sequence[Table]) -> list[Table]:
-    """Return tables, those that go on from the one before as one with it."""
-    joined = list(tables[:1])
+def joined_where_they_go_on(tables: Sequence[Table]) -> list[Table]:
+    """Return tables, those that go on from the one before as one with it, such as the pages of a printed one."""
+    joined, counts = list(tables[:1]), [1]
     for table in tables[1:]:
         if _goes_on(joined[-1], table):
-            note = f"{joined[-1].span} and {table.span}, in which time goes on, read as one table."
             rows, lines = [*joined[-1].rows, *table.rows], [*joined[-1].lines, *table.lines]
-            joined[-1] = replace(joined[-1], rows=rows, lines=lines).noted(note)
+            joined[-1] = replace(joined[-1], rows=rows, lines=lines)
+            counts[-1] += 1
         else:
             joined.append(table)
-    return joined
+            counts.append(1)
+    return [
+        table.noted(f"{count} tables in {table.span} go on from one another, and are read as one.")
+        if count > 1
+        else table
+        for table, count in zip(joined, counts, strict=True)
+    ]
 
 
 def _goes_on(table: Table, later: Table) -> bool:
-    """Tell whether a table has the names of the one before, and times that go on from there."""
+    """Tell whether a table has the names of the one before, and goes on from there: in time, or in every column."""
     if (table.names, table.units) != (later.names, later.units):
         return False
     times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
+    if not times:
+        return not later.title and _goes_on_evenly(table, later)
     ends = table.taken(np.array([0, len(table.rows) - 1]))
-    return bool(times) and all(
+    return all(
         earlier[0] < earlier[-1] <= continued[0]
         for earlier, continued in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
     )
+
+
+def _goes_on_evenly(table: Table, later: Table) -> bool:
+    """Tell whether a table begins within a step of the rows of the one before, and not as that one began."""
+    numbers, row = _numbers([*table.cells(), *later.cells()]), len(table.rows)
+    if not numbers.size or not np.isfinite(numbers).all():
+        return False
+    steps = np.abs(np.diff(numbers, axis=0))
+    largest = np.delete(steps, row - 1, axis=0).max(axis=0, initial=0)
+    begins_alike = np.abs(numbers[row] - numbers[0]) <= SAME * np.ptp(numbers, axis=0)
+    return bool((steps[row - 1] <= MOST_STEPS * largest).all() and not begins_alike.all())

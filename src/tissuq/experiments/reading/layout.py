@@ -117,9 +117,10 @@ def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
             continue
         has_units = position + 1 < len(texts) and is_units_row(cells(texts[position + 1]), row)
         is_apart = lines[position][0] > lines[position - 1][0] + 1 or last_row < position - 1
-        if text.strip() == header or ((is_apart or has_units) and _are_names(row)):
-            first_row = position + 1 + has_units
-            if _length(texts, cells, first_row, limit=FEWEST_ROWS) == FEWEST_ROWS:
+        is_header = text.strip() == header
+        if is_header or ((is_apart or has_units) and _are_names(row)):
+            first_row, fewest = position + 1 + has_units, 1 if is_header else FEWEST_ROWS
+            if _length(texts, cells, first_row, limit=fewest) == fewest:
                 starts.append(last_row + 1)
                 last_row = first_row
     return starts

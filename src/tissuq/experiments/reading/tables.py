@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.arrangement import blocks_of, joined_in_time, transposed_table
+from tissuq.experiments.reading.arrangement import blocks_of, joined_where_they_go_on, transposed_table
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.layout import (
@@ -74,7 +74,7 @@ def read_tables(
 ) -> list[Table]:
     """Return the tables in a file, where lines above them, names, units and rows are recognised, or that in memory.
 
-    Tables with the same names, in which a time goes on from one to the next, are one.
+    Tables with the same names that go on from one to the next, in time or without one in every column, are one.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _read_every_line(
     starts = [content[position][0] for position in later_tables(content, layout)]
     bounds = pairwise([0, *starts, len(lines) + 1])
     spans = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
-    tables = joined_in_time([_table_of(file, span, layout.separator, sheet) for span in spans])
+    tables = joined_where_they_go_on([_table_of(file, span, layout.separator, sheet) for span in spans])
     lines_with_text = {line for line, _ in filled}
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
