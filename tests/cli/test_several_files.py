@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.experiments.reading.tests_in_file import measurements
 
 STRETCH = {"uniaxial": np.array([0.8, 0.9, 1.1, 1.2, 1.3, 1.4]), "planar": np.array([1.05, 1.1, 1.2, 1.3, 1.4])}
 NOISE = {"uniaxial": 1e-3 * np.array([1, 0, -2, 1, 0, -1]), "planar": 1e-3 * np.array([2, -4, 0, 3, -1])}
@@ -191,3 +192,31 @@ def test_each_file_is_read_once_and_each_note_is_printed_once(cli, here, monkeyp
     again = cli("fit", "--config", "one/run.toml", *ALONE, "--out", "again")
     means = [summary_of(here / folder)[0]["C10_mean"] for folder in ("again", "one")]
     assert (again.status, means[0]) == (0, means[1])
+
+
+def in_compression(folder):
+    """Displacements and forces of a cylinder 10 mm high, 8 mm across, which count compression as positive."""
+    stretch = np.linspace(1, 0.8, 9)
+    stress = tq.engineering_stress(tq.materials()["neo-hookean"](), tq.loading_modes()["uniaxial"](), stretch, [0.05])
+    rows = np.column_stack([10 * (1 - stretch), -stress * np.pi * 4**2]).tolist()
+    file = folder / "compression.csv"
+    file.write_text("\n".join(["displacement [mm],force [N]", *(f"{a!r},{b!r}" for a, b in rows)]) + "\n")
+    return file
+
+
+def test_sizes_and_signs_go_to_the_files_that_need_them(cli, files, here):
+    sizes = {"length": "10 mm", "diameter": "8 mm"}
+    of_compression = ["--length", "10 mm", "--diameter", "8 mm", "--compression-positive"]
+    said = cli("fit", files[0], files[1], in_compression(here), *of_compression, *ALONE, "--out", "run")
+    assert (said.status, said.err) == (0, "")
+    tests = tomllib.loads((here / "run" / "run.toml").read_text())["tests"]
+    assert [test["dimensions"] for test in tests] == [{}, {}, sizes]
+    assert [test.get("compression_positive") for test in tests] == [None, None, True]
+    together = measurements([*files, here / "compression.csv"], dimensions=sizes, compression_positive=True)
+    assert [test.size for test in together.tests] == [5, 6, 9]
+
+
+def test_sizes_that_no_file_needs_are_refused(cli, files):
+    said = cli("fit", *files, "--length", "10 mm", *ALONE)
+    assert said.status == 2
+    assert "b.csv, column 'stretch' is read as stretch, which needs no length" in said.err

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["files_of", "find_tests", "measured", "resolve", "run_name"]
 
-SELECTION = ("sheet", "table", "columns", "only", "dimensions", "compression_positive")
+OPTIONAL_FOR_TESTS = ("dimensions", "compression_positive")
+"""Options that a test does without where another one needs them: an error where none does."""
+SELECTION = ("sheet", "table", "columns", "only", *OPTIONAL_FOR_TESTS)
 """Options that differ between the tests in a file: where each is, and what not all need."""
 
 
@@ -71,6 +73,8 @@ def measured(
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
     found = [of_test for of_file in of_files for _, of_test in of_file]
+    if any(reading.get(option) and not any(test.get(option) for test in tests) for option in OPTIONAL_FOR_TESTS):
+        find_tests(files[0], reading, is_only_file=True)
     if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
@@ -117,7 +121,8 @@ def find_tests(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) ->
 
     path, _, name = (str(file), "", "") if file.exists() else str(file).partition("#")
     options = {name: value for name, value in reading.items() if value is not None}
-    tests = find_tests_in_file(path, **load_settings(ReadingSettings, None, options).reading_options)
+    reading_options = load_settings(ReadingSettings, None, options).reading_options
+    tests = find_tests_in_file(path, is_one_of_several=not is_only_file, **reading_options)
     names = {str(number): test for number, test in enumerate(tests, start=1)} | {test.name: test for test in tests}
     if name and name not in names:
         there_are = ", ".join(f"'{test.name}'" for test in tests)

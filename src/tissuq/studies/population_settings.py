@@ -127,7 +127,12 @@ class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
             return {name: [reading] for name, reading in readings.items()}
         specimens: dict[str, list[Reading]] = {}
         for name, files in sources.items():
-            tests = [test for file in files for test in find_tests_in_file(file, **self.reading_options)]
+            is_one_of_several, options = len(files) > 1, self.reading_options
+            tests = [
+                test
+                for file in files
+                for test in find_tests_in_file(file, is_one_of_several=is_one_of_several, **options)
+            ]
             for test in tests:
                 is_one = len(files) > 1 or len(tests) == 1
                 specimen = name if is_one else test.reading.experiment.specimen or test.name

@@ -83,12 +83,22 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     >>> [test.name for test in read_tests(datasets.path("rubber-treloar-uniaxial"))]
     ['rubber-treloar-uniaxial']
     """
+    return _read(path, options)
+
+
+def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False) -> list[Experiment]:
+    """Return all tests in one file or table, and warn of what there is to know of them."""
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
-    tests = find_tests_in_file(path, **plain)
+    tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
     noted = concerned((test.name, text) for test in tests for text in test.reading.notes)
     for text, names in noted.items():
-        warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=2)
+        warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=3)
     return [test.reading.experiment for test in tests]
+
+
+def _is_read(data: Any) -> bool:
+    """Tell whether measurements are still to be read: a file, or a table."""
+    return isinstance(data, str | os.PathLike) or is_data_frame(data)
 
 
 def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
@@ -113,7 +123,7 @@ def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[Py
     [0.0, 0.2]
     """
     spelled_out(options, READING_OPTIONS, more_names)
-    if isinstance(data, str | os.PathLike) or is_data_frame(data):
+    if _is_read(data):
         return Experiment.of(read_tests(data, **options))
     if isinstance(data, Experiment):
         if options:
@@ -123,18 +133,28 @@ def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[Py
             )
         return data
     if isinstance(data, Sequence):
-        return Experiment.of([measurements(test, more_names, **options) for test in data])
+        is_one_of_several = len(data) > 1
+        tests = [
+            Experiment.of(_read(test, options, is_one_of_several=is_one_of_several))
+            if _is_read(test)
+            else measurements(test, more_names, **options)
+            for test in data
+        ]
+        return Experiment.of(tests)
     raise InputError(
         "measurements are needed: a file ('test.csv'), a table (a DataFrame, a Dataset of xarray), or an Experiment, "
         f"which tissuq.Experiment(mode, stretch, stress) makes of arrays; or a list of these. Not {data!r:.80}."
     )
 
 
-def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[TestInFile]:
+def find_tests_in_file(
+    path: Any, *, is_one_of_several: bool = False, **options: Unpack[ReadingOptions]
+) -> list[TestInFile]:
     """Return all tests in one file, as `read_tests` reads them, each with the options that read it alone.
 
     Shorter tables without columns of deformation and load, such as one of results, are no tests, nor are a few rows
-    beside one of many; those of statistics, in which these columns may be, are far shorter.
+    beside one of many; those of statistics, in which these columns may be, are far shorter. Sizes and signs that a
+    test cannot use are left out where it is one of several, in the file or in several files.
 
     Raises
     ------
@@ -161,7 +181,11 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
             unrecognised.append((table, error))
             continue
         try:
-            tests += [test for columns in of_table for test in _of_one_table(rows, path, selection, names, columns)]
+            tests += [
+                test
+                for columns in of_table
+                for test in _of_one_table(rows, path, selection, names, columns, is_only_test=not is_one_of_several)
+            ]
         except InputError as error:
             unreadable.append((table, error))
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
@@ -236,8 +260,13 @@ def _of_one_table(
     options: ReadingOptions,
     names: list[str],
     columns: ColumnsOfTest | None,
+    *,
+    is_only_test: bool,
 ) -> Iterator[TestInFile]:
-    """Yield the test in some rows and columns, or those of each specimen that a column names."""
+    """Yield the test in some rows and columns, or those of each specimen that a column names.
+
+    One that has no name of its own in the file is the only test, unless there are other files.
+    """
     words = [*names, columns.name] if columns else names
     name = " ".join(words) or Path(path).stem
     of_test: ReadingOptions = {"name": name, **options}
@@ -252,10 +281,10 @@ def _of_one_table(
         for label in dict.fromkeys(several.labels):
             rows = table.taken(np.flatnonzero(labels == label))
             selection: ReadingOptions = {**options, "only": {**only, several.column: label}}
-            yield from _of_one_table(rows, path, selection, [*names, label], columns)
+            yield from _of_one_table(rows, path, selection, [*names, label], columns, is_only_test=is_only_test)
         return
     except InputError as error:
-        if not words:
+        if is_only_test and not words:
             raise
         reading, of_test = _without_what_others_need(table, path, words, of_test, error)
     mode = options.get("mode") or reading.experiment.mode.name
@@ -272,13 +301,14 @@ def _without_what_others_need(
     InputError
         When it cannot be read without them either: the error with them.
     """
-    without: list[ReadingOptions] = [
-        {**options, "dimensions": None},
-        {**options, "compression_positive": None},
-        {**options, "dimensions": None, "compression_positive": None},
-    ]
-    for of_test in without:
-        if of_test != options:
+    sizes = options.get("dimensions") or {}
+    of_section = {name: size for name, size in sizes.items() if name != "length"}
+    of_length = {name: size for name, size in sizes.items() if name == "length"}
+    for compression_positive in dict.fromkeys([options.get("compression_positive"), None]):
+        for dimensions in (sizes, of_section, of_length, {}):
+            of_test: ReadingOptions = {
+                **options, "dimensions": dimensions or None, "compression_positive": compression_positive
+            }  # fmt: skip
             with suppress(InputError):
                 return read_rows(table, path, words, **of_test), of_test
     raise error
