@@ -259,6 +259,11 @@ def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
         ("E11,PK2 [MPa]", {"columns": {"strain": "E11"}}, "may be a strain of several types"),
         ("E_GL (%),Engineering stress (MPa)", {}, "may be a strain of several types"),
         ("Lagrangian strain (%),Engineering stress (MPa)", {}, "may be a strain of several types"),
+        (
+            "Shear strain e12,Shear stress (MPa)",
+            {"mode": "simple-shear", "columns": {"shear": 1}},
+            "half of the amount of shear: to read twice its values give --strain-type green",
+        ),
         ("Strain,S (MPa)", {}, "'S (MPa)' may be a stress of several types"),
         ("Strain,S11 (MPa)", {}, "'S11 (MPa)' may be a stress of several types"),
         ("True strain,Engineering stress [MPa]", {"strain_type": "green"}, "named a strain of type 'true'"),

@@ -93,6 +93,23 @@ def test_outliers_are_said_and_the_advice_leaves_them_out(inspected):
     assert len(inspection.reading.experiment) == 119
 
 
+def test_copied_rows_are_said_and_the_advice_leaves_them_out(inspected):
+    rows = np.r_[0:80, 30:121]
+    notes = inspected((1 + 0.3 * WAY)[rows], (10 * WAY + WAY**2)[rows]).warnings
+    (note,) = [note for note in notes if "to the last digit" in note]
+    assert note.startswith("lines 82:131 repeat 32:81 to the last digit")
+    inspection = inspected(
+        (1 + 0.3 * WAY)[rows], (10 * WAY + WAY**2)[rows], leave_out=re.search(r"--leave-out (\S+)\.$", note)[1]
+    )
+    assert inspection.warnings == ()
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, 1 + 0.3 * WAY, atol=1e-6)
+
+
+def test_rows_on_the_way_back_are_no_copies(inspected):
+    rows = np.r_[0:121, 119:-1:-1]
+    assert not any("last digit" in note for note in inspected((1 + 0.3 * WAY)[rows], (10 * WAY)[rows]).warnings)
+
+
 def test_a_fall_a_turning_point_and_a_kink_are_no_outliers():
     for values in (WAY - 0.4 * (WAY > 0.5), 1 - np.abs(2 * WAY - 1), np.maximum(WAY - 0.3, 0)):
         assert not len(find_outliers(values))

@@ -48,7 +48,7 @@ def test_a_specimen_that_is_taut_from_the_first_row_starts_there(tmp_path):
     path.write_text("stretch,stress [kPa]\n1.25,2\n1.5,4\n")
     reading = read_file(path, preload="1 kPa")
     np.testing.assert_allclose(reading.experiment.stretch, [1.0, 1.2])
-    assert "in line 2, the first, where the stress is already 0.002 MPa" in reading.used.steps[2]
+    assert "in line 2, the first, where the stress is already 2 kPa" in reading.used.steps[2]
 
 
 def test_compression_is_taut_by_the_size_of_its_stress(tmp_path):
@@ -68,7 +68,7 @@ def test_cauchy_stress_is_divided_by_the_stretch_counted_from_the_preload(tmp_pa
 @pytest.mark.parametrize(
     ("preload", "words"),
     [
-        ("5 N", "the preload 5 N is not reached: the largest stress is 0.5 MPa, and the preload is 2.5 MPa"),
+        ("5 N", "the preload 5 N is not reached: the largest stress is 500 kPa, and the preload is 2500 kPa"),
         ("0.1", "a positive force or stress with its unit, such as '0.05 N', not '0.1'"),
         ("-1 N", "not '-1 N'"),
         ("1 g", "'g' is a mass, not a force"),

@@ -90,6 +90,16 @@ class StressUnit:
     name: str
     to_mpa: float
 
+    def written(self, stress: float) -> str:
+        """Return a stress in MPa as people read it, in this unit.
+
+        Examples
+        --------
+        >>> StressUnit("kPa", 1e-3).written(0.25)
+        '250 kPa'
+        """
+        return f"{stress / self.to_mpa:.6g} {self.name}"
+
 
 def stress_unit(text: str) -> StressUnit:
     """Return the stress unit that a text means.

@@ -32,6 +32,7 @@ REGIONS: dict[str, dict[str, Any]] = {
     "saturation": _BROAD | {"color": "#009E73"},
     "slip": _RING | {"color": "#D55E00"},
     "outlier": _RING | {"color": "#CC79A7"},
+    "copies": _BROAD | {"color": "#56B4E9"},
     "drift": _RING | {"color": "#009E73", "marker": "s"},
 }
 """How the regions of a test are marked."""

@@ -41,6 +41,8 @@ NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak
 """In a line above the table that speaks of strain or stress without saying what the columns hold."""
 NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
+TENSOR_SHEAR = re.compile(r"\b(e|eps|epsilon|ε)[ _]?([1-3xyzrθ])(?!\2)[1-3xyzrθ]\b|tensor")
+"""Names of a shear strain that is a component of a tensor: half of the amount of shear."""
 SHEAR_STRESS = re.compile(
     r"shear|lateral|horizontal|schub|scher|quer|cisaillement|cort[ae]|taglio|cisalhamento|τ|tau|"
     r"сдвиг|касательн|剪切|剪应|せん断"
@@ -208,6 +210,12 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
         )
     if is_strain and not strain_type and NOT_ENGINEERING_STRAIN.search(name):
         raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {say_which('strain')}")
+    if choice.measure == "shear" and not strain_type and TENSOR_SHEAR.search(name):
+        raise InputError(
+            f"{table.place(choice.deformation)} is named as a component of a strain tensor, which is half of the "
+            "amount of shear: to read twice its values give --strain-type green. If it holds the amount of shear "
+            "(gamma) all the same, give --strain-type engineering."
+        )
     if choice.load == "stress" and not stress_type and re.search(OTHER_MEASURE, contents.quantities[choice.stress]):
         raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {say_which('stress')}")
     if is_strain and not strain_type:

@@ -330,7 +330,7 @@ def read_rows(
         errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
     elif preload is not None:
         thresholds = [load.stress_in(preload) for load in loads]
-        used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference)
+        used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference, shown)
     if (stretch_range := options.get("stretch_range")) is not None:
         used = used.within(*stretch_range)
     if options.get("until_peak"):
@@ -348,7 +348,7 @@ def read_rows(
     if (step := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
-    check_signs(used, choices, bool(is_positive), options.get("turn"))
+    check_signs(used, choices, bool(is_positive), options.get("turn"), shown)
     if mode.name == Uniaxial.name and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
         used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")

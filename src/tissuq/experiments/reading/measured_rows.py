@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
+from tissuq.experiments.units import StressUnit
 
 __all__ = ["COUNTED_FROM", "Dropped", "MeasuredRows", "labelled"]
 
@@ -164,7 +165,9 @@ class MeasuredRows:
         """Return the rows with stretches, or amounts of shear, counted from others (k, 1)."""
         return replace(self, stretch=self.stretch / starts if reference else self.stretch - starts)
 
-    def taut(self, preload: str, thresholds: Sequence[float], peak: int, reference: float = 1.0) -> MeasuredRows:
+    def taut(
+        self, preload: str, thresholds: Sequence[float], peak: int, reference: float, unit: StressUnit
+    ) -> MeasuredRows:
         """Return the rows in which every axis carries the preload, with stretches counted from where it first does.
 
         That is where the absolute stress last rises through its threshold (MPa) on the way to the row ``peak``,
@@ -177,7 +180,7 @@ class MeasuredRows:
             When no row carries the preload.
         """
         pairs = enumerate(thresholds)
-        starts = [_TautStart.of(self, number, preload, threshold, peak) for number, threshold in pairs]
+        starts = [_TautStart.of(self, number, preload, threshold, peak, unit) for number, threshold in pairs]
         if reference and (not_positive := next((start for start in starts if start.stretch <= 0), None)):
             raise InputError(
                 f"{self.table.file}: where the preload {preload} is reached ({not_positive.place_in_words}), the "
@@ -221,15 +224,17 @@ class _TautStart:
     place_in_words: str
 
     @classmethod
-    def of(cls, measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int) -> _TautStart:
+    def of(
+        cls, measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int, unit: StressUnit
+    ) -> _TautStart:
         """Return where the stress of that number reaches a threshold on the way to a row."""
         table, stretch, size = measured.table, measured.stretch[number], np.abs(measured.stress[number])
         is_loaded = size[: peak + 1] >= threshold
         if not is_loaded.any():
             raise InputError(
                 f"{table.file}: the preload {preload} is not reached: the largest stress is "
-                f"{size[: peak + 1].max():g} MPa, and the preload is {threshold:g} MPa. Give a lower one, and check "
-                "the units of force and area."
+                f"{unit.written(size[: peak + 1].max())}, and the preload is {unit.written(threshold)}. Give a lower "
+                "one, and check the units of force and area."
             )
         slack = np.flatnonzero(~is_loaded)
         slack = slack[slack < np.flatnonzero(is_loaded)[-1]]
@@ -240,7 +245,9 @@ class _TautStart:
             words = f"between {table.counted}s {table.lines[row - 1]} and {table.lines[row]}"
             start = cls(row, float(reference), words)
         else:
-            words = f"in {table.counted} {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
+            words = (
+                f"in {table.counted} {table.lines[0]}, the first, where the stress is already {unit.written(size[0])}"
+            )
             start = cls(0, float(stretch[0]), words)
         return start
 

@@ -25,6 +25,8 @@ AUTO = "auto"
 UNTIL_PEAK = "to leave out what follows the largest stress give --until-peak."
 COARSE_STEP = 0.007
 """Share of the largest load from which its step is worth a word: its error is then that of a careful laboratory."""
+FEWEST_COPIED_ROWS = 5
+"""Rows after one another that measure, to the last digit, what others after one another did."""
 UNIFORM_SD = 12**-0.5
 """Standard deviation of an error that is even over a step."""
 
@@ -229,6 +231,24 @@ def _outliers(tested: TestedStress) -> Iterator[Region]:
         )
 
 
+def _copies(tested: TestedStress) -> Iterator[Region]:
+    """Yield rows that are those from further above once more: no second cycle is equal to the last digit."""
+    measured = np.vstack([tested.used.stretch, tested.used.stress])
+    _, first, number = np.unique(measured, axis=1, return_index=True, return_inverse=True)
+    origin = first[number.ravel()]
+    is_next = (origin[1:] < np.arange(1, len(origin))) & (np.diff(origin) == 1) & (np.diff(measured[-1]) != 0)
+    runs = np.split(np.arange(1, len(origin)), np.flatnonzero(np.diff(is_next)) + 1)
+    runs = [np.append(run[0] - 1, run) for run in runs if len(run) >= FEWEST_COPIED_ROWS - 1 and is_next[run[0] - 1]]
+    if runs:
+        rows = np.concatenate(runs)
+        yield Region(
+            "copies",
+            rows,
+            f"{tested.place(rows)} repeat {tested.lines(origin[rows])} to the last digit, as a copy does and no "
+            f"measurement: {_leave_out(tested, rows)}",
+        )
+
+
 def _drift(tested: TestedStress) -> Iterator[Region]:
     if tested.rupture or tested.holds or tested.slips:
         return
@@ -305,6 +325,7 @@ CHECKS: tuple[Callable[[TestedStress], Iterator[Region]], ...] = (
     _slips,
     _saturation,
     _outliers,
+    _copies,
     _drift,
     _load_step,
     _stretch_step,

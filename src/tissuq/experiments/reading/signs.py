@@ -15,6 +15,7 @@ from tissuq.experiments.reading.options import TURNS
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.units import StressUnit
 
 __all__ = ["check_signs", "with_signs"]
 
@@ -163,14 +164,18 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
 
 
 def check_signs(
-    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, turn: str | None = None
+    measured: MeasuredRows,
+    choices: Sequence[ColumnChoice],
+    compression_positive: bool,
+    turn: str | None,
+    unit: StressUnit,
 ) -> None:
     """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for.
 
     Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
     """
     try:
-        _check_work(measured, choices, compression_positive)
+        _check_work(measured, choices, compression_positive, unit)
     except InputError as error:
         if turn is None:
             raise
@@ -179,9 +184,11 @@ def check_signs(
         ) from error
 
 
-def _check_work(measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool) -> None:
+def _check_work(
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, unit: StressUnit
+) -> None:
     if choices[0].measure in SHEARS:
-        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0], unit)
         return
     if choices[0].load == "pressure":
         _check_inflation(measured.table, choices[0], measured.stretch[0], measured.stress[0])
@@ -195,11 +202,17 @@ def _check_work(measured: MeasuredRows, choices: Sequence[ColumnChoice], compres
     are_wrong = [_wrong_sign(stretch, stress, stretch != 1) is not None for _, stretch, stress in axes]
     advice = "" if len(axes) == 1 else TURN_ALL if all(are_wrong) else TURN_ONE
     for axis in axes:
-        _check_signs(clear.table, *axis, compression_positive, advice)
+        _check_signs(clear.table, *axis, compression_positive, advice, unit)
 
 
 def _check_signs(
-    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool, advice: str
+    table: Table,
+    choice: ColumnChoice,
+    stretch: Column,
+    stress: Column,
+    compression_positive: bool,
+    advice: str,
+    unit: StressUnit,
 ) -> None:
     row = _wrong_sign(stretch, stress, stretch < 1)
     if row is not None:
@@ -210,7 +223,7 @@ def _check_signs(
                 "(--compression-positive)."
             )
         if advice:
-            raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {advice}")
+            raise InputError(f"{cell} (compression) the stress is positive ({unit.written(stress[row])}). {advice}")
         alternative = "; if the column of stretches holds strain, give it as strain"
         if choice.measure in ("strain", "displacement"):
             alternative = (
@@ -218,7 +231,7 @@ def _check_signs(
                 "(--tension-positive)"
             )
         raise InputError(
-            f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
+            f"{cell} (compression) the stress is positive ({unit.written(stress[row])}). If the machine "
             "counts compression as positive, give compression_positive=True (--compression-positive)"
             f"{alternative}."
         )
@@ -233,17 +246,17 @@ def _check_signs(
         advice = advice or "If the machine counts so, give turn='load' (--turn load), or check which columns are read."
         raise InputError(
             f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
-            f"is negative ({stress[row]:g} MPa); tension must be positive. {advice}"
+            f"is negative ({unit.written(stress[row])}); tension must be positive. {advice}"
         )
 
 
-def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
+def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column, unit: StressUnit) -> None:
     row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
     if row is not None:
         raise InputError(
             f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
-            f"{stress[row]:g} MPa; it must have the sign of the shear. Turn one of them, turn='load' (--turn load), "
-            "or check which columns are read."
+            f"{unit.written(stress[row])}; it must have the sign of the shear. Turn one of them, turn='load' "
+            "(--turn load), or check which columns are read."
         )
 
 
