@@ -37,7 +37,7 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
     if MPA_ASSUMED in source:
         sentences.append(
             f"{DOUBTFUL_UNIT} the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit "
-            "kPa, or --stress-unit MPa."
+            "kPa, or --stress-unit MPa (in Python unit='kPa' or 'MPa')."
         )
     if RATIO_ASSUMED in source:
         strain = STRAIN_MEASURES[choices[0].strain_type].strain
