@@ -299,3 +299,12 @@ def test_a_sheet_of_statistics_is_left_out_beside_a_long_test(tmp_path):
     with pytest.warns(UserWarning, match="sheet 'Statistik' is left out: it is short"):
         (test,) = tq.read_tests(path)
     assert len(test) == 60
+
+
+def test_a_load_along_one_of_two_axes_is_read_alone_as_the_message_says(tmp_path):
+    columns = lines_of(STRETCH, np.ones(len(STRETCH)) + 0.1 * (STRETCH - 1), STRESSES[0])
+    path = written(tmp_path / "a.csv", "stretch x,stretch y,stress x (kPa)", *columns)
+    with pytest.raises(InputError, match=r"a load along axis x alone: read that one, axis='x' \(--axis x\)"):
+        read_tests(path)
+    (test,) = read_tests(path, axis="x", mode="planar")
+    assert (test.mode.name, test.size) == ("planar", len(STRETCH))

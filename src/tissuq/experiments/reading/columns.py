@@ -271,6 +271,14 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
             f"{table.file} has no columns of an axis '{axis}'. {columns_there_are(table)} Leave axis (--axis) out."
         )
     if axis is None and len(axes) == 2 and not mapping:
+        loaded = {axis_of_load for axis_of_load, name in names if any(name in role_names(role) for role in LOADS)}
+        if len(loaded & {*axes}) == 1:
+            (only,) = loaded & {*axes}
+            raise InputError(
+                f"{table.file} has deformations along two axes, and a load along axis {only} alone: read that one, "
+                f"axis='{only}' (--axis {only}), in the loading mode in which the specimen was stretched, such as "
+                "--mode planar where the other axis was held, or equibiaxial where both were stretched alike."
+            )
         raise InputError(
             f"{table.file} is of a biaxial test. Say which axis is read: axis='x' (--axis x) or axis='y' (--axis y), "
             "with the loading mode that belongs to it, or read both at once: mode='biaxial' (--mode biaxial). If "
