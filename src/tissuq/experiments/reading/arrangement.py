@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,30 +124,33 @@ def _begins_anew(numbers: NDArray[np.float64], row: int) -> bool:
 
 def joined_where_they_go_on(tables: Sequence[Table]) -> list[Table]:
     """Return tables, those that go on from the one before as one with it, such as the pages of a printed one."""
-    joined, counts = list(tables[:1]), [1]
-    for table in tables[1:]:
-        if _goes_on(joined[-1], table):
-            rows, lines = [*joined[-1].rows, *table.rows], [*joined[-1].lines, *table.lines]
-            joined[-1] = replace(joined[-1], rows=rows, lines=lines)
-            counts[-1] += 1
+    runs: list[list[Table]] = []
+    for table in tables:
+        if runs and _goes_on(runs[-1][0].rows[0], runs[-1][-1], table):
+            runs[-1].append(table)
         else:
-            joined.append(table)
-            counts.append(1)
-    return [
-        table.noted(f"{count} tables in {table.span} go on from one another, and are read as one.")
-        if count > 1
-        else table
-        for table, count in zip(joined, counts, strict=True)
-    ]
+            runs.append([table])
+    return [run[0] if len(run) == 1 else _as_one(run) for run in runs]
 
 
-def _goes_on(table: Table, later: Table) -> bool:
-    """Tell whether a table has the names of the one before, and goes on from there: in time, or in every column."""
+def _as_one(tables: Sequence[Table]) -> Table:
+    """Return tables beneath one another as one, with a note."""
+    rows = [*chain.from_iterable(table.rows for table in tables)]
+    lines = [*chain.from_iterable(table.lines for table in tables)]
+    whole = replace(tables[0], rows=rows, lines=lines)
+    return whole.noted(f"{len(tables)} tables in {whole.span} go on from one another, and are read as one.")
+
+
+def _goes_on(first_row: str, table: Table, later: Table) -> bool:
+    """Tell whether a table has the names of the one before, and goes on from there: in time, or in every column.
+
+    The one before may itself go on from others, of which the first row is given.
+    """
     if (table.names, table.units) != (later.names, later.units):
         return False
     times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
     if not times:
-        return not later.title and _goes_on_evenly(table, later)
+        return not later.title and _goes_on_evenly(first_row, table, later)
     ends = table.taken(np.array([0, len(table.rows) - 1]))
     return all(
         earlier[0] < earlier[-1] <= continued[0]
@@ -155,12 +158,13 @@ def _goes_on(table: Table, later: Table) -> bool:
     )
 
 
-def _goes_on_evenly(table: Table, later: Table) -> bool:
-    """Tell whether a table begins within a step of the rows of the one before, and not as that one began."""
-    numbers, row = _numbers([*table.cells(), *later.cells()]), len(table.rows)
+def _goes_on_evenly(first_row: str, table: Table, later: Table) -> bool:
+    """Tell whether a table begins within a step of the rows of the one before, and not as the first row."""
+    cells = [*replace(table, rows=[first_row]).cells(), *table.cells(), *later.cells()]
+    numbers, seam = _numbers(cells), len(table.rows)
     if not numbers.size or not np.isfinite(numbers).all():
         return False
-    steps = np.abs(np.diff(numbers, axis=0))
-    largest = np.delete(steps, row - 1, axis=0).max(axis=0, initial=0)
-    begins_alike = np.abs(numbers[row] - numbers[0]) <= SAME * np.ptp(numbers, axis=0)
-    return bool((steps[row - 1] <= MOST_STEPS * largest).all() and not begins_alike.all())
+    steps = np.abs(np.diff(numbers[1:], axis=0))
+    largest = np.delete(steps, seam - 1, axis=0).max(axis=0, initial=0)
+    begins_alike = np.abs(numbers[seam + 1] - numbers[0]) <= SAME * np.ptp(numbers, axis=0)
+    return bool((steps[seam - 1] <= MOST_STEPS * largest).all() and not begins_alike.all())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -215,8 +216,8 @@ def _read_every_line(
     if layout is None:
         raise _no_table(file, content)
     starts = [content[position][0] for position in later_tables(content, layout)]
-    bounds = pairwise([0, *starts, len(lines) + 1])
-    spans = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
+    bounds = pairwise(bisect_left(filled, (start, "")) for start in (0, *starts, len(lines) + 1))
+    spans = [filled[start:stop] for start, stop in bounds]
     tables = joined_where_they_go_on([_table_of(file, span, layout.separator, sheet) for span in spans])
     lines_with_text = {line for line, _ in filled}
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
