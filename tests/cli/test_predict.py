@@ -45,6 +45,13 @@ def test_a_mode_is_predicted(cli, here, run):
     assert (here / "run-planar" / "figures" / "prediction.png").exists()
 
 
+def test_the_name_of_a_file_says_its_mode_as_for_a_fit(cli, here, run):
+    (here / "planar sheet.csv").write_text(PLANAR_KPA.partition("\n")[2])
+    said = cli("predict", run, "--data", "planar sheet.csv", "--discrepancy", "none", "--no-figures", "--out", "out")
+    assert said.status == 0, said.err
+    assert "Predicted stress: planar" in said.out
+
+
 def test_measurements_are_compared_with_and_the_prediction_repeats(cli, here, run, planar):
     options = ["--discrepancy", "none", "--points", 5, "--no-figures"]
     said = cli("predict", run, "--data", planar, *options, "--stress", "cauchy")

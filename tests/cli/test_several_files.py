@@ -73,7 +73,7 @@ def test_specimens_noise_and_tolerances_are_those_given(cli, files, here):
     said = cli("fit", *files, *ALONE, *options)
     assert said.status == 0, said.err
     (row,) = summary_of(here / "run")
-    tolerances = tq.Tolerances(stress=0.1, zero=0.5e-3)
+    tolerances = tq.Tolerances("tissue", stress=0.1, zero=0.5e-3)
     posterior = expected(files, noise_sd=[1e-3, 2e-3], tolerances=tolerances)
     assert float(row["C10_mean"]) == pytest.approx(posterior.marginals["C10"].mean, rel=1e-9)
     assert float(row["log_evidence"]) == pytest.approx(posterior.solution.log_evidence, rel=1e-9)

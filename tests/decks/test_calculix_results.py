@@ -8,7 +8,9 @@ import subprocess
 import numpy as np
 import pytest
 
-from tissuq.decks.calculix_results import CELL_TYPES, read_dat, read_frd
+from tissuq.decks.abaqus import AbaqusDeck
+from tissuq.decks.calculix_results import CELL_TYPES, CalculiXResults, read_dat, read_frd
+from tissuq.decks.result_file import Results
 from tissuq.errors import InputError
 
 CCX = shutil.which("ccx")
@@ -143,3 +145,54 @@ def test_the_nodes_of_every_solid_are_in_the_order_of_vtk(tmp_path):
     cells = {CELL_TYPES[kind][0]: found.points[members[0]] for kind, (members, _) in found.cells.items()}
     for place, (name, corners, edges) in enumerate(SOLIDS.values()):
         np.testing.assert_allclose(cells[name], shifted(corners, edges, 5 * place), err_msg=name)
+
+
+CYLINDER = """*NODE, NSET=NALL
+1, 0., 0.
+2, 5., 0.
+3, 5., 4.
+4, 0., 4.
+5, 2.5, 0.
+6, 5., 2.
+7, 2.5, 4.
+8, 0., 2.
+*ELEMENT, TYPE=CAX8R, ELSET=EALL
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*NSET, NSET=TOP
+3, 4, 7
+*MATERIAL, NAME=GEL
+*HYPERELASTIC, NEO HOOKE
+0.5, 0.02
+*SOLID SECTION, ELSET=EALL, MATERIAL=GEL
+*STEP, NLGEOM
+*STATIC
+0.25, 1.
+*BOUNDARY
+1, 2, 2
+2, 2, 2
+5, 2, 2
+4, 1, 1
+8, 1, 1
+1, 1, 1
+TOP, 2, 2, 0.8
+*NODE PRINT, NSET=TOP
+RF
+*NODE FILE
+U, RF
+*END STEP
+"""
+
+
+@pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
+def test_forces_of_an_axisymmetric_body_are_the_same_in_both_files(tmp_path):
+    (tmp_path / "job.inp").write_text(CYLINDER)
+    subprocess.run([CCX, "-i", "job"], cwd=tmp_path, check=True, capture_output=True)
+    sets = {"TOP": {3, 4, 7}}
+    is_ring = AbaqusDeck().is_axisymmetric([CYLINDER.encode()])
+    in_dat = CalculiXResults(tmp_path / "job.frd", Results(tmp_path, "job", node_sets=sets, is_axisymmetric=is_ring))
+    force = in_dat.of_set("RF", "TOP", "sum").values[-1, :, 1].sum()
+    (tmp_path / "job.dat").unlink()
+    in_frd = CalculiXResults(tmp_path / "job.frd", Results(tmp_path, "job", node_sets=sets, is_axisymmetric=is_ring))
+    assert in_frd.of_set("RF", "TOP", "sum").values[-1, :, 1].sum() == pytest.approx(force, rel=1e-4)
+    # A cylinder of radius 5 in tension by a fifth, nearly incompressible: 2 C10 (l - 1/l^2) pi r^2, over 180 sectors.
+    assert force == pytest.approx(2 * 0.5 * (1.2 - 1.2**-2) * np.pi * 25 / 180, rel=0.02)

@@ -227,3 +227,24 @@ def test_a_matrix_that_is_unstable_is_left_out_with_its_fibres(monkeypatch):
 def test_fibres_with_a_free_energy_are_no_materials():
     with pytest.raises(tq.ModelError, match=r"has fibres.*discrepancy='none'"):
         sheet(discrepancy="auto").ensemble(2)
+
+
+def test_draws_of_two_posteriors_are_paired_at_random_once_one_is_shuffled():
+    """Sequences of other seeds that are spread alike hang together row by row."""
+    stretch = np.linspace(0.8, 1.3, 9)
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.02, seed=1)
+    posterior = tq.fit(data, discrepancy="none", noise_sd=0.02)
+
+    def stiffness(draws):
+        return [draw.parts[0][1][0] for draw in draws]
+
+    as_drawn, shuffled = [], []
+    for seed in range(8):
+        first, second = stiffness(posterior.ensemble(128, seed)), posterior.ensemble(128, seed + 1)
+        as_drawn.append(np.corrcoef(first, stiffness(second))[0, 1])
+        of_second = second.shuffled([seed, 1])
+        shuffled.append(np.corrcoef(first, stiffness(of_second))[0, 1])
+        assert sorted(stiffness(of_second)) == sorted(stiffness(second))
+        assert [draw.number for draw in of_second] == list(range(128))
+    assert np.abs(as_drawn).max() > 0.5
+    assert np.abs(shuffled).max() < 4 / np.sqrt(128)

@@ -13,9 +13,9 @@ from tissuq.posterior.solver import Solver
 STRETCH = np.linspace(0.8, 1.3, 9)
 
 
-def specimens(count):
+def specimens(count, spread=0.1):
     """Neo-Hookean specimens a tenth apart."""
-    moduli = 0.5 * np.linspace(0.9, 1.1, count)
+    moduli = 0.5 * np.linspace(1 - spread, 1 + spread, count)
     return [
         tq.simulate("neo-hookean", {"C10": modulus}, STRETCH, noise_sd=0.01, seed=number)
         for number, modulus in enumerate(moduli)
@@ -252,3 +252,51 @@ def test_independent_errors_below_the_resolution_that_is_assumed_stay_so(seed):
     fine = drifting(0.0, seed=seed, sd=1e-4)  # the resolution is 0.002 of the largest stress
     assert fine.stress.max() > 1
     assert tq.fit(fine, discrepancy="taylor").model.noise.name == "unknown"
+
+
+@pytest.mark.parametrize("count", [2, 6])
+def test_repeated_tests_of_one_specimen_do_not_tell_the_error_of_its_area(count):
+    tests = [test.labelled(specimen="one") for test in specimens(count, spread=0.0)]
+    model = tq.fit(tests, discrepancy="none").model
+    standard = tq.estimands()["specimen"].sizes
+    assert model.tolerances.stress == standard["stress"]
+    assert model.tolerances.test == pytest.approx(model.fitted_errors.factor * standard["test"])
+    assert model.fitted_errors.factor < 1
+    for off in (0.94, 1.06):  # by one standard deviation, and a little
+        of_area = [
+            tq.Experiment("uniaxial", STRETCH, off * test.stress, test.name).labelled(specimen="one") for test in tests
+        ]
+        low, high = tq.fit(of_area, discrepancy="none").marginals["C10"].hdi()
+        assert low < 0.5 < high
+
+
+def test_tests_of_several_specimens_tell_both_spreads():
+    moduli, rng = 0.5 * np.exp(0.15 * np.array([-1.2, -0.3, 0.4, 1.1])), np.random.default_rng(2)
+    tests = [
+        tq.simulate("neo-hookean", {"C10": modulus * (1 + 0.005 * rng.normal())}, STRETCH, noise_sd=0.002, seed=k)
+        .labelled(specimen=str(k))
+        for k, modulus in enumerate(moduli)
+        for _ in range(3)
+    ]  # fmt: skip
+    tolerances = tq.fit(tests, discrepancy="none").model.tolerances
+    assert tolerances.test < 0.04
+    assert 0.08 < tolerances.stress < 0.3
+
+
+def test_spreads_that_are_stated_are_kept_whatever_their_size():
+    standard = tq.estimands()["tissue"].sizes
+    for size in (standard["stress"], 1.01 * standard["stress"]):
+        tolerances = tq.Tolerances("tissue", stress=size)
+        model = tq.fit(specimens(4), discrepancy="none", noise_sd=0.01, tolerances=tolerances).model
+        assert model.tolerances.stress == size
+        assert model.fitted_errors.factor is None
+
+
+def test_sizes_alone_replace_those_of_the_default_one_by_one():
+    for tests, estimand in ((specimens(1)[0], "specimen"), (specimens(2), "tissue")):
+        model = tq.fit(tests, discrepancy="none", tolerances={"slack": 0.01, "stress": 0.07}).model
+        assert model.tolerances == tq.Tolerances(estimand, slack=0.01, stress=0.07)
+    model = tq.fit(specimens(1)[0], discrepancy="none", noise_sd=0.01, tolerances={"slack": 0.01}).model
+    assert model.tolerances == tq.Tolerances(slack=0.01)
+    with pytest.raises(tq.InputError, match="there is no error of a test named 'slak'"):
+        tq.fit(specimens(1)[0], tolerances={"slak": 0.01})

@@ -133,6 +133,15 @@ class AbaqusDeck(DeckFormat):
                 counts[dimensions] = counts.get(dimensions, 0) + numbers // row
         return MeshSize(counts[max(counts)], max(counts)) if counts else None
 
+    def is_axisymmetric(self, files: Sequence[bytes]) -> bool:
+        types = (
+            _joined(keyword.parameters.get("TYPE", ""))
+            for content in files
+            for keyword in keywords_of(content)
+            if keyword.name == "ELEMENT"
+        )
+        return any(kind.startswith("CAX") for kind in types)
+
 
 def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:
     spans, refused = [], ""

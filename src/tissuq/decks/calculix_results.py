@@ -33,6 +33,8 @@ ORDERS = {
     5: [*range(9), *range(12, 15), *range(9, 12)],
 }
 """Nodes of ``.frd`` in the order of VTK, where it is another: there the edges across stand last."""
+SECTORS_OF_RING = 180
+"""Sectors of 2 degrees, of which CalculiX computes one: its forces are in ``.dat``, those of the ring in ``.frd``."""
 NUMBER = 12
 """Columns of a number, and of what stands before the first."""
 LEADING = 13
@@ -85,6 +87,8 @@ class CalculiXResults(ResultFile):
         if not steps:
             return None
         values = np.array([_components(fields, kind) for _, fields in steps])
+        if kind == "RF" and self.results.is_axisymmetric:
+            values /= SECTORS_OF_RING
         return Values(np.array([time for time, _ in steps]), values)
 
     def of_set(self, kind: str, set_name: str, how: str) -> Values | None:

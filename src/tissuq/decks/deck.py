@@ -132,6 +132,10 @@ class DeckFormat(ABC):
         """Return the number of elements of most dimensions, and these; None where they are not known."""
         return None
 
+    def is_axisymmetric(self, files: Sequence[bytes]) -> bool:
+        """Return whether files have elements of an axisymmetric body, where that is known."""
+        return False
+
     def matches(self, material: DeckMaterial, wanted: str) -> bool:
         """Return whether a material is the one that is wanted: by its name, whatever its case, or its number."""
         return wanted.strip().casefold() in (material.name.strip().casefold(), material.number.casefold())

@@ -53,6 +53,8 @@ class Results:
         Fields (``U``, ``RF``, ``S``, ``E``) and sets that are going to be read, for programs that write them together.
     program : str
         The program that opens its files, where these are not open to others.
+    is_axisymmetric : bool
+        Whether the deck has elements of an axisymmetric body.
     """
 
     folder: Path
@@ -61,6 +63,7 @@ class Results:
     node_sets: Mapping[str, set[int]] = field(default_factory=dict)
     asked: tuple[tuple[str, str], ...] = ()
     program: str = ""
+    is_axisymmetric: bool = False
 
     @cached_property
     def file(self) -> ResultFile | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 from numbers import Real
@@ -65,7 +65,7 @@ ESTIMANDS: Mapping[str, Estimand] = MappingProxyType(
             MappingProxyType({"stress": 0.05, "test": 0.05, **LABORATORY}),
         ),
         TISSUE: Estimand(
-            "the tissue: another specimen, errors of the test included",
+            "the tissue (the mean of its specimens), errors of the test included",
             MappingProxyType({"stress": 0.18, "test": 0.1, **LABORATORY}),
         ),
     }
@@ -202,8 +202,23 @@ class Tolerances:
         return self._sizes.get(ResolutionError.name, 0.0)
 
     def with_sizes(self, **sizes: float) -> Tolerances:
-        """Return the same tolerances but for these sizes."""
-        return Tolerances(self.estimand, **(self._stated | sizes))
+        """Return the same tolerances but for these sizes, which do not count as stated by themselves."""
+        changed = Tolerances("" if self.estimand == AS_TESTED else self.estimand, **(self._stated | sizes))
+        changed._numbers = self._numbers
+        return changed
+
+    def replaced_by(self, sizes: Mapping[str, float]) -> Tolerances:
+        """Return the same tolerances but for sizes that are stated as numbers.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> tq.Tolerances("specimen").replaced_by({"slack": 0.02})
+        Tolerances('specimen', slack=0.02)
+        """
+        changed = self.with_sizes(**sizes)
+        changed._numbers = self._numbers | sizes.keys()
+        return changed
 
     def at_least(self, sizes: Mapping[str, float]) -> Tolerances:
         """Return the same with errors at least as large, but for those that were stated as numbers.
@@ -231,10 +246,9 @@ class Tolerances:
         sizes = " and ".join(f"{name} of {self._sizes[name]:.2g}" for name in names)
         return f"the tolerance {sizes} is as large as the measurements show" if names else ""
 
-    def with_factor(self, factor: float) -> Tolerances:
-        """Return the same tolerances with the spreads between specimens and tests times a factor."""
-        names = [name for name in (ScaleError.name, TestError.name) if name in self._sizes]
-        return self.with_sizes(**{name: factor * self._sizes[name] for name in names})
+    def with_factor(self, factor: float, names: Collection[str]) -> Tolerances:
+        """Return the same tolerances with some of their sizes times a factor."""
+        return self.with_sizes(**{name: factor * self._sizes[name] for name in names if name in self._sizes})
 
     def of_contradictory_tests(self, experiment: Experiment) -> Tolerances:
         """Return the same with so much between tests that each differs by `CONTRADICTION_SPREAD` or more."""
@@ -248,7 +262,9 @@ class Tolerances:
         """Whether the spreads between specimens and tests are those of the estimand, not stated by themselves."""
         standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
         names = ScaleError.name, TestError.name
-        return bool(standard) and all(self._sizes.get(name, 0.0) == standard.get(name, 0.0) for name in names)
+        is_stated = bool(self._numbers & {*names})
+        is_standard = all(self._sizes.get(name, 0.0) == standard.get(name, 0.0) for name in names)
+        return bool(standard) and is_standard and not is_stated
 
     def in_common(self, experiment: Experiment) -> float:
         """Return the standard deviation of the relative error of stress that all specimens and tests have in common."""

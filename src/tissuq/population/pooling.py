@@ -44,7 +44,7 @@ def fit_population(
     noise_sd: float | str | Mapping[str, float | str | Sequence[float]] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    tolerances: Tolerances | str | None = None,
+    tolerances: Tolerances | Mapping[str, float] | str | None = None,
     method: Method = "auto",
     seed: int = 0,
 ) -> Population:
@@ -128,6 +128,7 @@ def fit_population(
         )
     known = covariates_of(covariates, list(specimens))
     of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
+    of_tests = of_tests if isinstance(of_tests, Tolerances) else Tolerances(**of_tests)
     if of_tests.estimand == TISSUE:
         raise InputError(
             f"the errors of the estimand '{TISSUE}' hold how much specimens differ, which a population finds itself: "

@@ -156,6 +156,11 @@ class Ensemble(Sequence[EnergyDraw]):
     def __len__(self) -> int:
         return len(self.draws)
 
+    def shuffled(self, seed: int | Sequence[int]) -> Ensemble:
+        """Return the same draws in another order, numbered by it, to pair them with those of another ensemble."""
+        order = np.random.default_rng(seed).permutation(len(self))
+        return replace(self, draws=tuple(replace(self.draws[k], number=number) for number, k in enumerate(order)))
+
     def __iter__(self) -> Iterator[EnergyDraw]:
         return iter(self.draws)
 

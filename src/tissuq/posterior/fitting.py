@@ -37,7 +37,7 @@ def fit(
     noise_sd: float | str | Sequence[float | str] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    tolerances: Tolerances | str | None = None,
+    tolerances: Tolerances | Mapping[str, float] | str | None = None,
     method: Method = "auto",
     stable_in: str | Sequence[str] = (),
     seed: int = 0,
@@ -68,14 +68,15 @@ def fit(
         autoregressive where the data are far more probable so, else independent.
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
-    tolerances : Tolerances or str
+    tolerances : Tolerances, mapping of str to float, or str
         By how much whole tests may be off, and so what the intervals are of: ``"as-tested"``, ``"specimen"`` or
-        ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances(stress=0.1, length=0.02)`` or
-        ``Tolerances("specimen", slack=0)``. Sizes that are not stated as numbers are at least the ``least_errors`` of
-        the experiment. By default they are of the specimen, or where tests are of several, of the
-        tissue; as tested where the noise of one test is known, or a discrepancy that is no energy alone takes up errors
-        of the test. Unless they are stated as numbers, the spreads between specimens and tests are as large as several
-        tests tell. Standard errors of means that the data state are in all of them but ``"as-tested"``.
+        ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances("specimen", slack=0)``; a mapping such as
+        ``{"slack": 0.01}`` replaces those of the default one by one, ``Tolerances(slack=0.01)`` has no others. Sizes
+        that are not stated as numbers are at least the ``least_errors`` of the experiment. By default they are of the
+        specimen, or where tests are of several, of the tissue; as tested where the noise of one test is known, or a
+        discrepancy that is no energy alone takes up errors of the test. Unless they are stated as numbers, the spreads
+        between specimens and tests are as large as several tests tell. Standard errors of means that the data state are
+        in all of them but ``"as-tested"``.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
@@ -143,7 +144,7 @@ def fit_many(
     noise_sd: float | str | Sequence[float | str] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    tolerances: Tolerances | str | None = None,
+    tolerances: Tolerances | Mapping[str, float] | str | None = None,
     method: Method = "auto",
     stable_in: str | Sequence[str] = (),
     seed: int = 0,
@@ -178,6 +179,10 @@ def fit_many(
     experiments = [measurements(data, OPTIONS, **reading) for data in datasets]
     if isinstance(tolerances, str):
         tolerances = Tolerances(tolerances)
+    replacing = dict(tolerances) if isinstance(tolerances, Mapping) else {}
+    if isinstance(tolerances, Mapping):
+        Tolerances(**replacing)  # which refuses what is no size of an error
+        tolerances = None
     if tolerances is not None and not isinstance(tolerances, Tolerances):
         raise InputError(
             f"tolerances must be such as tissuq.Tolerances(stress=0.1), or one of {', '.join(ESTIMANDS)}, not "
@@ -195,7 +200,7 @@ def fit_many(
     def model_of(data: Experiment) -> StatisticalModel:
         stated = tolerances.at_least(data.least_errors) if tolerances else tolerances or Tolerances()
         model = StatisticalModel(data, *options, stated)
-        standard = default_tolerances(model) if tolerances is None else stated
+        standard = default_tolerances(model).replaced_by(replacing) if tolerances is None else stated
         if tolerances is None or tolerances.estimand not in ("", AS_TESTED):
             standard = with_standard_errors(model, standard)
         if standard.stated != stated.stated:

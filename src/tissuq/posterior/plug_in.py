@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +15,11 @@ from tissuq.inference.enumerators.noise_grid import at_level, at_noise, with_kno
 from tissuq.inference.peak import highest
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import Discrepancy
-from tissuq.model.measurement_errors import MeanError
+from tissuq.model.measurement_errors import MeanError, ScaleError, TestError
 from tissuq.model.noise import AutoregressiveNoise, UnknownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK
-from tissuq.model.tolerances import AS_TESTED, BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
+from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
 __all__ = ["ErrorEstimates", "default_tolerances", "with_standard_errors"]
@@ -87,7 +87,8 @@ class ErrorEstimates:
     def with_spreads_of_tests(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose spreads of the stress, between specimens and tests, are as large as several tests tell.
 
-        Tests along one path tell a factor of the stated spreads. Those along different paths do not: an energy
+        Tests along one path tell a factor of the stated spreads: those of one specimen that between its tests alone,
+        because they share what it differs by from others (its area, too). Those along different paths do not: an energy
         reconciles them whatever they differ by, and what it cannot (a direction of the tissue) is no spread. Where such
         an energy is hardly ever stable, the tests contradict each other: energies of I1 alone are then fitted, with the
         spread of such tests.
@@ -110,7 +111,8 @@ class ErrorEstimates:
                 model = _of_contradictory_tests(model, simpler).with_errors(reconciling_stability=probability)
                 return model.with_errors(fits=self._fits)
         if have_one_path:
-            model = self._with_factor(model, level)
+            for names in _spreads_that_are_told(model.experiment):
+                model = self._with_factor(model, level, names)
         return model.with_errors(fits=self._fits)
 
     def with_probable_noise(self, model: StatisticalModel) -> StatisticalModel:
@@ -162,14 +164,14 @@ class ErrorEstimates:
         log_level, largest = highest(log_evidence, float(np.log(level)), LEVEL_STEP, reach, LEVEL_ACCURACY)
         return float(np.exp(log_level)), largest
 
-    def _with_factor(self, model: StatisticalModel, level: float | None) -> StatisticalModel:
-        """Return a model with its spreads times the factor that its tests tell, at a level of errors if noise needs it.
+    def _with_factor(self, model: StatisticalModel, level: float | None, names: Collection[str]) -> StatisticalModel:
+        """Return a model with spreads times the factor that its tests tell, at a level of errors if noise needs it.
 
         The factor is the root of its posterior mean square over a grid, under a prior of mean square one, half
         Student's t with three degrees of freedom; at the noise that is likely without it.
         """
         stated, sketch = model.tolerances, _sketch(model)
-        candidates = [replace(sketch, tolerances=stated.with_factor(float(factor))) for factor in FACTORS]
+        candidates = [replace(sketch, tolerances=stated.with_factor(float(factor), names)) for factor in FACTORS]
         if level is not None:
             candidates = [at_level(candidate.with_errors(level=level)) for candidate in candidates]
         evidences = [self._solution(candidate).log_evidence for candidate in candidates]
@@ -178,7 +180,8 @@ class ErrorEstimates:
         log_evidence = np.array(evidences, dtype=np.float64)
         weight = np.exp(log_evidence - log_evidence.max()) * FACTORS / (1 + FACTORS**2) ** 2  # even in the logarithm
         factor = float(np.sqrt(weight @ FACTORS**2 / weight.sum()))
-        return replace(model, tolerances=stated.with_factor(factor)).with_errors(factor=factor)
+        model = replace(model, tolerances=stated.with_factor(factor, names))
+        return model.with_errors(factor=factor) if TestError.name in names else model
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable.
@@ -225,6 +228,14 @@ class ErrorEstimates:
     def _solution(self, model: StatisticalModel) -> Solution:
         self._fits += 1
         return self._solve(model)
+
+
+def _spreads_that_are_told(experiment: Experiment) -> Sequence[tuple[str, ...]]:
+    """Return the errors whose sizes tests along one path tell, those together that they cannot tell apart."""
+    tests, specimens = specimens_of(experiment).shape
+    if specimens == tests:
+        return [(ScaleError.name, TestError.name)]
+    return [(TestError.name,), (ScaleError.name,)][: min(specimens, 2)]
 
 
 def _peak(places: FloatArray, values: FloatArray) -> float:
@@ -297,12 +308,11 @@ def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tol
 
     The same where there are none, the noise is known or more than one number, or a discrepancy takes up such errors.
     """
-    noise, sizes = model.noise, tolerances.stated
+    noise = model.noise
     is_open = len(noise.parameters) == 1 and not (model.is_correlated or noise.shares_discrepancy)
-    if not is_open or MeanError.name in sizes or not model.experiment.standard_error.any():
+    if not is_open or MeanError.name in tolerances.stated or not model.experiment.standard_error.any():
         return tolerances
-    estimand = "" if tolerances.estimand == AS_TESTED else tolerances.estimand
-    return Tolerances(estimand, **(sizes | {MeanError.name: 1.0}))
+    return tolerances.with_sizes(**{MeanError.name: 1.0})
 
 
 def _have_one_path(experiment: Experiment) -> bool:

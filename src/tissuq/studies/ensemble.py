@@ -194,9 +194,10 @@ def drawn_materials(
     for name, run in settings.materials.items():
         step(f"draws of {name}")
         posterior = load(beside / run, settings.discrepancy, law)
-        seed = settings.seed + runs.index(run)  # materials of different runs are independent
-        sampling = cast("Sampling", settings.sampling)
-        ensembles[name] = posterior.ensemble(settings.draws, seed, sampling, admissible=not settings.all_draws)
+        seed, sampling = settings.seed + runs.index(run), cast("Sampling", settings.sampling)
+        ensemble = posterior.ensemble(settings.draws, seed, sampling, admissible=not settings.all_draws)
+        # Materials of different runs are independent: draws that are spread alike are paired at random.
+        ensembles[name] = ensemble.shuffled([settings.seed, runs.index(run)]) if run != runs[0] else ensemble
     return ensembles
 
 

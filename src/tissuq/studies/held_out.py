@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment.stability import measured_states
@@ -56,7 +56,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
         raise InputError("predicting a test from the others needs two or more tests.")
     if isinstance(options.get("noise_sd"), Sequence) and not isinstance(options["noise_sd"], str):
         raise InputError("to predict a test from the others give one noise_sd for all tests, or leave it unknown.")
-    if options.get("tolerances") is None:  # those of all tests, of which one alone has none
+    if isinstance(options.get("tolerances"), Mapping | None):  # those of all tests, of which one alone has none
         model = fit(tests, **options).model
         options |= {"tolerances": model.tolerances, "discrepancy": model.discrepancy}
     rows = []

@@ -64,10 +64,9 @@ class PredictionSettings(RunSettings):
             When the data say that they are of another mode, or the run is of several modes.
         """
         from tissuq.experiments.modes import loading_mode
-        from tissuq.experiments.reading.stated_mode import mode_in_comment
         from tissuq.studies.earlier_run import modes_of
 
-        stated = None if self.data is None else self.data.mode or mode_in_comment(folder / self.data.file)
+        stated = None if self.data is None else self.data.mode_stated(folder)
         if self.mode and stated and loading_mode(self.mode) != loading_mode(stated):
             assert self.data is not None  # noqa: S101 (they told)
             raise InputError(

@@ -23,7 +23,7 @@ class ToleranceSettings(Settings):
     estimand: str | None = option(
         None,
         "What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a careful "
-        "laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens].",
+        "laboratory), or the tissue (the mean of its specimens) [specimen; tissue for files of several specimens].",
     )
     tolerances: SizesOfErrors = option(
         None,
@@ -44,8 +44,11 @@ class ToleranceSettings(Settings):
             looked_up(Tolerances, name)
         return name
 
-    def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
-        """Return the tolerances, those of stresses converted from a unit to MPa; None for those of `tissuq.fit`."""
+    def tolerances_in(self, unit: StressUnit) -> Tolerances | dict[str, float] | None:
+        """Return the tolerances, those of stresses converted from a unit to MPa.
+
+        Where no estimand is given, the sizes that replace those of `tissuq.fit`, or None.
+        """
         from tissuq.model.tolerances import Tolerances
 
         if self.tolerances is None and self.estimand is None:
@@ -53,4 +56,5 @@ class ToleranceSettings(Settings):
         sizes = self.tolerances or {}
         is_stress = {error.name for error, _ in Tolerances(**sizes) if error.is_stress}
         scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in sizes}
-        return Tolerances(self.estimand or "", **{name: size * scale[name] for name, size in sizes.items()})
+        in_mpa = {name: size * scale[name] for name, size in sizes.items()}
+        return in_mpa if in_mpa and self.estimand is None else Tolerances(self.estimand or "", **in_mpa)
