@@ -37,8 +37,10 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "one-direction": "There is tension or compression only.",
         "poorly-determined": "The data determine the headline parameter poorly.",
         "prior-bound": "A bound of a prior, not the data, determines part of the result.",
+        "prior-dominates": "A prior that was given determines the result as much as the data do, or more.",
         "stability-contradicted": "The data contradict the stability that was required.",
         "stress-at-rest": "There is stress at the reference state, which no elastic material has.",
+        "tests-apart": "Several tests differ by more than tests of one tissue are assumed to.",
         "unmodelled-curve": "The fitted curve does not follow the measured one.",
         "unstable": "Material and discrepancy are more often unstable than stable over the measured range.",
     }

@@ -141,3 +141,37 @@ def test_an_answer_prints_itself_in_its_unit():
     lines = str(answer).splitlines()
     assert lines[0] == "initial shear modulus 1.46 kPa, 95 % interval 1.23 to 1.69"
     assert lines[-1] == "Next: posterior.design()"
+
+
+def in_shear_and_tension(times):
+    """Tests of two specimens, one of which is so many times as stiff as the other."""
+    stretch = np.linspace(0.85, 1.25, 21)
+    tension = tq.simulate("neo-hookean", {"C10": 3e-3}, stretch, noise_sd=3e-5, seed=1)
+    shear = tq.simulate(
+        "neo-hookean", {"C10": 3e-3 * times}, np.linspace(0, 0.5, 21), mode="simple-shear", noise_sd=3e-5, seed=2
+    )
+    return [tension, shear]
+
+
+def test_tests_that_no_spread_between_them_explains_give_no_modulus():
+    posterior = tq.fit(in_shear_and_tension(4.0))
+    (warning,) = (warning for warning in posterior.warnings if warning.code == "tests-apart")
+    assert "is 2.5 times that of one material for all" in warning
+    assert "correlated-residuals" not in {warning.code for warning in posterior.warnings}
+    assert verdicts(posterior)[0] == Verdict.NO
+
+
+def test_tests_that_differ_as_specimens_do_are_not_said_to_contradict_each_other():
+    codes = {warning.code for warning in tq.fit(in_shear_and_tension(1.2)).warnings}
+    assert not codes & {"tests-apart", "contradicting-tests"}
+
+
+def test_a_prior_that_outweighs_the_data_is_said_and_the_modulus_reported_with_care():
+    data = tq.simulate("neo-hookean", {"C10": 3e-3}, np.linspace(0.8, 1.3, 21), noise_sd=3e-5, seed=1)
+    for centre in (1e-3, 3e-3):
+        posterior = tq.fit(data, priors={"C10": tq.Normal(centre, 1e-5)})
+        (warning,) = (warning for warning in posterior.warnings if warning.code == "prior-dominates")
+        assert "for C10 determines the result more than the data do" in warning
+        assert verdicts(posterior)[0] == Verdict.CARE
+    wide = tq.fit(data, priors={"C10": tq.Normal(3e-3, 3e-2)})
+    assert "prior-dominates" not in {warning.code for warning in wide.warnings}

@@ -154,6 +154,7 @@ def _reporting(
         "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
         "there is stress at rest, so that it may be off by far more than its interval": "stress-at-rest" in codes,
         "a bound of its prior, not the data, determines it": is_cut,
+        "the tests contradict each other, so that it may be that of none of them": "tests-apart" in codes,
         "the fitted curve departs from the measured one, and the interval does not include that": (
             "unmodelled-curve" in codes
         ),
@@ -172,6 +173,8 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
     if "contradicting-tests" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
+    if "prior-dominates" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
     if "not-near-reference" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
     model = solution.model

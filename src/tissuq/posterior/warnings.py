@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
+from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Uniform
 from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -41,6 +44,8 @@ MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS = 0.3, 4.0
 """Lag-1 correlation of residuals that is reported, and by how many standard errors (1 / sqrt(n)) it must exceed 0."""
 
 
+MAX_SDS_APART = 2.5
+"""Standard deviations of the assumed spread of two tests that the log of the ratio of their stresses may be off."""
 MAX_PROBABILITY_OF_MISSES = 1e-3
 """Probability that so few measurements are inside their 95 % bands, were these right, below which they are not."""
 
@@ -100,10 +105,14 @@ def warnings_about(
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     lag1, held = _lag1_correlation(solution), int(inside.sum())
-    if lag1 is not None:
+    if apart := _tests_apart(solution):
+        yield ResultWarning(apart, "tests-apart")
+    elif lag1 is not None:
         yield _correlated_residuals(solution.model, lag1)
     elif not cut and bdtr(held, len(inside), 0.95) < MAX_PROBABILITY_OF_MISSES:
         yield _missed_measurements(solution.model, f"{held} of {len(inside)}")
+    if words := _influence_of_priors(solution):
+        yield ResultWarning(words, "prior-dominates")
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
     if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
@@ -154,6 +163,10 @@ def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning
 def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
     """Return the warning about bands that do not hold the measurements, and what is likely to cure it."""
     text = f"only {counts} measurements are inside their 95 % bands, so that intervals are too narrow. "
+    if len(model.experiment.tests) > 1 and model.noise.parameters:
+        return ResultWarning(
+            text + "See which of the tests departs from the others, and fit it by itself.", "unmodelled-curve"
+        )
     if model.energy_symbols or not model.material.is_isotropic:
         return ResultWarning(
             text + "Give a larger noise, or leave it unknown ({noise_sd}).", "unmodelled-curve", noise_sd="unknown"
@@ -180,6 +193,12 @@ def _noise_is_inseparable(solution: Solution) -> bool:
     return bool(low < MIN_VARIANCE_SHARE and high > 1 - MIN_VARIANCE_SHARE)
 
 
+def _mean_curve(solution: Solution) -> NDArray[np.float64]:
+    """Return the mean stress (n,) at the measurements, from so few components that memory suffices."""
+    count = int(np.clip(MAX_ARRAY_VALUES // len(solution.model.states), 1, MAX_COMPONENTS))
+    return mean_curve(solution, thinned=count)
+
+
 def _lag1_correlation(solution: Solution) -> float | None:
     """Return the lag-1 correlation of the whitened residuals where it is significant and makes a difference, else None.
 
@@ -189,8 +208,7 @@ def _lag1_correlation(solution: Solution) -> float | None:
     model, curves = solution.model, []
     if model.is_correlated or model.experiment.size < MIN_MEASUREMENTS:
         return None
-    component_count = int(np.clip(MAX_ARRAY_VALUES // len(model.states), 1, MAX_COMPONENTS))
-    residual = np.asarray(model.white(model.experiment.measured - mean_curve(solution, thinned=component_count)))
+    residual = np.asarray(model.white(model.experiment.measured - _mean_curve(solution)))
     start = 0
     for count in map(len, model.experiment.curves):
         curves.append(residual[start : start + count])
@@ -201,6 +219,47 @@ def _lag1_correlation(solution: Solution) -> float | None:
         return None
     is_covered = np.sqrt(size / len(residual)) * widening_of_lag(lag1) < level_of_errors(solution)
     return None if is_covered else lag1
+
+
+def _tests_apart(solution: Solution) -> str:
+    """Return in words that tests are farther from the curve of one material than their spread allows; else nothing."""
+    model, tests = solution.model, solution.model.experiment.tests
+    tolerances, is_said = model.tolerances, bool(model.fitted_errors.contradiction)
+    if len(tests) < 2 or not (tolerances.stress or tolerances.test) or not model.energy_symbols or is_said:
+        return ""
+    curve, start, factors = _mean_curve(solution), 0, []
+    for test in tests:
+        own = curve[start : start + test.size]
+        factors.append(float(test.measured @ own / (own @ own)))
+        start += test.size
+    lowest, highest = int(np.argmin(factors)), int(np.argmax(factors))
+    is_one_specimen = bool(tests[lowest].specimen) and tests[lowest].specimen == tests[highest].specimen
+    sd = np.sqrt(2) * np.hypot(tolerances.test, 0.0 if is_one_specimen else tolerances.stress)
+    if factors[lowest] > 0 and np.log(factors[highest] / factors[lowest]) <= MAX_SDS_APART * sd:
+        return ""
+    names = [test.name or f"test {number}" for number, test in enumerate(tests, 1)]
+    return (
+        f"the tests contradict each other: the stress of '{names[highest]}' is {factors[highest]:.2g} times that of "
+        f"one material for all, and that of '{names[lowest]}' {factors[lowest]:.2g} times, farther apart than the "
+        f"spread of {np.hypot(tolerances.stress, tolerances.test):.0%} that is assumed. The interval may hold neither. "
+        "See whether units, areas, grips, friction, direction or the state of the specimens differed, and fit each by "
+        "itself."
+    )
+
+
+def _influence_of_priors(solution: Solution) -> str:
+    """Return in words that priors which were given, no bounds alone, determine the modulus as much as the data do."""
+    model = solution.model
+    given = [symbol for symbol in modulus_symbols(model) if symbol in model.chosen_priors]
+    if all(isinstance(model.chosen_priors[symbol], Uniform) for symbol in given):
+        return ""
+    sensitivity = power_scaling(solution)
+    if sensitivity is None or sensitivity.prior < MIN_SENSITIVITY:
+        return ""
+    words = f"the prior that was given for {' and '.join(given)} determines the result "
+    if sensitivity.likelihood < MIN_SENSITIVITY:
+        return words + "more than the data do: without it the result would be another one, unless both agree."
+    return words + "as much as the data do, and the two may contradict each other: see what the data say without it."
 
 
 def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
