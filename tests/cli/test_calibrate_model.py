@@ -45,6 +45,13 @@ def c10(folder: Path) -> tuple[float, float]:
     return rows["C10"]["mean"], rows["C10"]["sd"]
 
 
+def test_where_no_parameters_fit_units_and_priors_come_before_anything_else(cli, here, words):
+    forces(here)
+    said = cli(*words, "--prior", "C10=uniform(0.01,0.02)")
+    assert said.status == 0, said.err
+    assert "Next: check units and signs of data and model (--unit, --factor), and the priors" in said.out
+
+
 @pytest.mark.slow
 def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, here, words):
     mean, sd = forces(here)
@@ -58,6 +65,8 @@ def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, he
     assert said.status == 0, said.err
     constants = [float(row["card_C10"]) for row in rows_of(here / "cards" / "index.csv")]
     assert np.mean(constants) == pytest.approx(mean, abs=0.2 * sd)
+    said = cli("design", "out")
+    assert (said.status, "no stress was measured" in said.err) == (2, True)
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "got the card of neo-hookean" in page
     assert "<td>C10 [kPa]" in page

@@ -53,7 +53,25 @@ def test_short_times_are_told_apart():
 
 
 def test_the_share_beyond_is_a_whole_per_cent():
-    curve = {"complete": np.ones((50, 1))}
+    curve = {"complete": np.linspace(1, 2, 50)[:, None]}
     beyond = (np.ones(1), np.ones((50, 1)))
     (text,) = ModelEnsemble({"q": np.ones(1)}, {"q": curve}, beyond, (), (), 0.0).warnings
     assert "At the end 100 % of the elements" in text
+
+
+def of_one_time(values):
+    return ModelEnsemble({"q": np.ones(1)}, {"q": {"complete": np.array(values)[:, None]}}, None, (), (), 0.0)
+
+
+def test_a_quantity_that_no_draw_changes_is_said():
+    same = [text for text in of_one_time([3.5] * 50).warnings if "All draws give the same q" in text]
+    assert len(same) == 1
+    assert not of_one_time([3.5] * 49 + [3.6]).without_spread
+    assert not of_one_time([0.0] * 50).without_spread  # a support that does not move
+
+
+def test_the_band_is_that_of_the_draws_that_reached_the_end():
+    curves = np.column_stack([np.arange(8.0), np.r_[np.arange(5.0), [np.nan] * 3]])
+    ensemble = ModelEnsemble({"q": np.array([0.5, 1.0])}, {"q": {"complete": curves}}, None, (), (), 0.0)
+    (text,) = ensemble.warnings
+    assert text == "5 draws are too few for a 95 % band: the band is their range, a 67 % band."

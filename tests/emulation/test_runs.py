@@ -284,3 +284,16 @@ def test_where_a_solver_ended_early_it_may_have_ended_anywhere(problem, kind):
     curves = {quantity.name: (times, depth) for quantity in model.quantities}
     with pytest.raises(kind):
         model._at(np.array([0.1, 0.5]), "", curves, problem)
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0])
+def test_a_control_may_fall_in_model_and_data_alike(factor):
+    model = tq.DeckForward(
+        "block.inp", "TISSUE", "neo-hookean", "RF2@TOP", (0.7, 1.2), along="U2@TOP", along_factor=factor
+    )
+    times, depth = np.array([0.5, 1.0]), np.array([-1.5, -3.0]) * factor
+    force, control = next(iter(model.measured.values())).name, np.array([-3.0, -1.5, -0.75])
+    curves = {quantity.name: (times, depth) for quantity in model.quantities} | {force: (times, 10 * times)}
+    np.testing.assert_allclose(model._at(control, next(iter(model.measured)), curves, ""), [10, 5, 2.5], rtol=1e-9)
+    with pytest.raises(UnreadableError, match="give the sign, as --factor NAME=-1"):
+        model._at(-control, next(iter(model.measured)), curves, "")

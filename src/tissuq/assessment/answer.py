@@ -329,6 +329,8 @@ STEPS: Mapping[str, Step] = {
         "see which test would make it narrower: tissuq design {run}",
         "see which test would make it narrower: posterior.design()",
     ),
+    "apart": Step(*["find out why the tests contradict each other, as the warning says."] * 2),
+    "curve": Step(*["act on the warning about the measured curve, which the fit does not follow."] * 2),
     "second mode": Step(
         "measure a second loading mode; tissuq design {run} says which helps most.",
         "measure a second loading mode; posterior.design() says which helps most.",
@@ -343,6 +345,8 @@ STEPS: Mapping[str, Step] = {
     ),
 }
 """What may be done next."""
+BEFORE_ALL_ELSE = {"tests-apart": "apart", "unmodelled-curve": "curve"}
+"""Warnings without which no further step helps."""
 
 
 def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
@@ -362,6 +366,8 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
         return STEPS["auto"]
     if "few-measurements" in codes and reporting is Verdict.NO:
         return STEPS["few"]
+    if first := next((STEPS[step] for code, step in BEFORE_ALL_ELSE.items() if code in codes), None):
+        return first
     if "unstable" in codes:
         return STEPS["stable"]
     if reporting is not Verdict.YES:

@@ -134,7 +134,14 @@ class ModelEnsemble:
     @property
     def warnings(self) -> list[str]:
         """Warnings about the result."""
-        return [*_failed(self), *_beyond(self), *_too_few(self), *_mesh(self)]
+        return [*_failed(self), *_without_spread(self), *_beyond(self), *_too_few(self), *_mesh(self)]
+
+    @property
+    def without_spread(self) -> list[str]:
+        """The quantities, other than zero, that all draws have the same of."""
+        last = {name: self.last_values(name) for name in self.curves}
+        last = {name: values[np.isfinite(values)] for name, values in last.items()}
+        return [name for name, values in last.items() if len(values) > 1 and values[0] and not np.ptp(values)]
 
 
 def gathered(
@@ -294,8 +301,16 @@ def _mesh(ensemble: ModelEnsemble) -> list[str]:
     ]
 
 
+def _without_spread(ensemble: ModelEnsemble) -> list[str]:
+    return [
+        f"All draws give the same {name}: no section of the model may use the "
+        "material that was replaced, or the quantity does not depend on it."
+        for name in ensemble.without_spread
+    ]
+
+
 def _too_few(ensemble: ModelEnsemble) -> list[str]:
-    count = max(int(np.isfinite(ensemble.curves[name][COMPLETE]).sum(axis=0).max()) for name in ensemble.curves)
+    count = min(int(np.isfinite(ensemble.last_values(name)).sum()) for name in ensemble.curves)
     probability = band_probability(count)
     if probability >= PROBABILITY:
         return []

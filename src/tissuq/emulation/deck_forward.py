@@ -250,17 +250,21 @@ class DeckForward(Forward):
         count = min(len(curve.times) for curve in (quantity, *controls))
         along = self.along_factor * (controls[0].values if controls else quantity.times)[:count]
         values = self.factors[name] * quantity.values[:count]
+        sign = -1.0 if count > 1 and along[-1] < along[0] else 1.0  # a control that falls is looked at from behind
+        along, control = sign * along, sign * control
         reached = float(along[-1]) if count else 0.0
         is_short = count < 2 or reached < control.max() * (1 - 1e-9)
         has_failed = is_short and bool(problem)  # and may have ended anywhere
         if count > 1 and not has_failed and ((np.diff(along) <= 0).any() or control.min() < along[0]):
             raise UnreadableError(
-                f"the control of the model goes from {along[0]:.4g} to {reached:.4g}, and must rise from the smallest "
-                f"measured one, {control.min():.4g}, or below to the largest: give the sign, as --factor NAME=-1."
+                f"the control of the model goes from {sign * along[0]:.4g} to {sign * reached:.4g}, and must go "
+                f"on from {sign * control.min():.4g} or before to {sign * control.max():.4g}, as was measured: give "
+                "the sign, as --factor NAME=-1."
             )
         if is_short:
             why = f"{problem}; " if problem else ""
-            raise ConvergenceError(f"{why}the control came to {reached:.4g}, and {control.max():.4g} was measured")
+            came = f"the control came to {sign * reached:.4g}, and {sign * control.max():.4g} was measured"
+            raise ConvergenceError(f"{why}{came}")
         return np.asarray(PchipInterpolator(along, values)(np.minimum(control, reached)))
 
     @staticmethod

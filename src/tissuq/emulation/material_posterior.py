@@ -32,6 +32,8 @@ POINTS = 20
 """Number of stretches that stand for the range."""
 NOISE_SHARE = 1e-6
 """Noise of these over their largest stress: no stress was measured."""
+CALIBRATION = "calibration"
+"""Route of a posterior that is none of measured stresses."""
 
 
 def material_posterior(
@@ -93,7 +95,7 @@ def material_posterior(
     rhat = {symbol: float(sampled.rhat.get(symbol, np.nan)) for symbol in symbols}
     solution = Solution(
         model,
-        "calibration",
+        CALIBRATION,
         f"the parameters of a forward model that was calibrated on {len(problem.measured)} measurements "
         f"through an emulator of {runs} runs",
         lambda: mixture,

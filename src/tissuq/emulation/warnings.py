@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from tissuq.emulation.likelihood import Likelihood
     from tissuq.emulation.sampling import SampledPosterior
 
-__all__ = ["calibration_warnings"]
+__all__ = ["NO_PARAMETERS_FIT", "calibration_warnings"]
 
+NO_PARAMETERS_FIT = "no parameters that the priors allow give the measurements"
+"""Start of the warning that something other than the parameters is wrong."""
 MIN_EMULATOR_SHARE = 0.1
 """Share of a posterior variance due to the emulator from which a warning is given."""
 MAX_MEAN_SHIFT = 0.5
@@ -114,11 +116,13 @@ def _no_parameters_fit(
     predicted = emulator.moments(values[None])[0][0]
     worst = int(np.argmax(np.abs(problem.measured - predicted) / emulator.basis.scale))
     named = ", ".join(f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, values, strict=True))
+    misfit = np.sqrt(misfits.min() / size)
+    away = f"{misfit:.1f} standard deviations of noise, discrepancy and emulator away (root mean square; 1 is right)"
+    absorbed = "described by a discrepancy or a noise that takes up the whole difference"
     yield (
-        f"no parameters that the priors allow give the measurements: at the best ({named}) they are "
-        f"{np.sqrt(misfits.min() / size):.1f} standard deviations of noise, discrepancy and emulator away (root mean "
-        f"square; 1 is right), most at the control {problem.control[worst]:.4g}: measured "
-        f"{problem.measured[worst]:.4g}, model {predicted[worst]:.4g}. {is_out.sum()} of {size} measurements are "
+        f"{NO_PARAMETERS_FIT}: at the best ({named}) they are {absorbed if misfit < 1 else away}, most at the control "
+        f"{problem.control[worst]:.4g}: measured {problem.measured[worst]:.4g}, model {predicted[worst]:.4g}. "
+        f"{is_out.sum()} of {size} measurements are "
         "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
         "model (discrepancy gp-pinned)."
     )

@@ -11,6 +11,7 @@ import numpy as np
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
 from tissuq.emulation import Calibration, DeckForward, FileForward, SeveralModels
+from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
@@ -106,6 +107,8 @@ def _repeated(settings: CalibrationSettings) -> str:
 
 def _next_step(study: CalibrationStudy) -> str:
     calibration = study.calibration
+    if any(warning.startswith(NO_PARAMETERS_FIT) for warning in study.warnings):
+        return "check units and signs of data and model (--unit, --factor), and the priors: no parameters fit the data."
     if not calibration.converged:
         return "make the posterior converge: repeat the command with --method nuts --force, or narrower priors."
     if max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols) > LARGE_SHARE:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
+from tissuq.model.tolerances import SPECIMEN, TISSUE
 from tissuq.next_test.candidates import Target
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import Row, significant
@@ -33,10 +34,18 @@ CAPTION = (
     "Expected standard deviation after each test, the best on top. Lines reach from it to the standard deviation now; "
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
 )
-NEXT = "make the first of these tests, and fit it together with the data: tissuq fit DATA.csv NEW.csv"
+NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{estimand}"
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")
 """Columns in the unit of a target."""
+
+
+def _next_step(study: DesignStudy) -> str:
+    """Return what to do, with the estimand for which the expected reduction holds."""
+    is_other = study.specimen == "other"
+    estimand = study.posterior.model.tolerances.estimand if is_other else ""
+    of_estimand = f" --estimand {estimand}" if estimand in (SPECIMEN, TISSUE) else ""
+    return NEXT.format(whose=" on another specimen" * is_other, estimand=of_estimand)
 
 
 def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
@@ -106,7 +115,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
         subject=f"{model.experiment.name} · {model.material.name}, discrepancy {model.discrepancy.name}",
         numbers=tuple(best[:MAX_TARGETS]),
         finding=" ".join(_sentences(study)[MAX_TARGETS:]),
-        next_step=NEXT if best else "",
+        next_step=_next_step(study) if best else "",
         picture=Picture(
             "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
             "Expected standard deviation after the best tests", "Expected standard deviation after a test; line: now."

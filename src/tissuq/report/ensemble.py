@@ -116,13 +116,19 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
 
 def _next_step(study: EnsembleStudy) -> str:
     result = study.result
+    if result.without_spread:
+        names = ", ".join(result.without_spread)
+        return f"see whether the model uses the material that was replaced: all draws give the same {names}."
     if result.failures:
-        return "look at the draws that failed below, and make them again: repeat the command with --again."
+        return (
+            "look at why draws failed, below. To make them again, where the solver was at fault, repeat the command "
+            "with --again; a model with other increments or another mesh needs another --out."
+        )
     beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))
     if beyond is not None and beyond > MUCH_BEYOND:
         return "measure up to the strains of the model: tissuq design RUN says which test helps most (RUN: the fit)"
     if result.draws < FEW_DRAWS:
-        return f"make the band more accurate: repeat the command with --draws {FEW_DRAWS}."
+        return f"make the band more accurate: repeat the command with --draws {FEW_DRAWS} and another --out."
     return "see which test would make the band narrower: tissuq design RUN (RUN: the fit)"
 
 
@@ -224,7 +230,7 @@ def _plain(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]:
-    percent = f"{100 * band_probability(max(int(table['draws'].max()) for table in tables.values())):.0f} %"
+    percent = f"{100 * band_probability(min(int(table['draws'].iloc[-1]) for table in tables.values())):.0f} %"
     shares = shares_in(next(iter(tables.values())), is_shared=study.result.is_shared)
     first = next(iter(tables.values()))
     return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)] + (

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.errors import InputError
+from tissuq.emulation.material_posterior import CALIBRATION
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.next_test.candidates import Target, target_named
@@ -105,6 +106,12 @@ def run_design(
         )
     step("loading the run")
     posterior = load(folder / settings.run, settings.discrepancy, settings.law_of(law))
+    if posterior.solution.route == CALIBRATION:
+        raise ModelError(
+            f"run '{settings.run}' is the calibration of a model: of it no stress was measured, so that what a further "
+            "test would tell beside it is not known. Take a run of tissuq fit; calibrate takes a run as prior "
+            "(--prior-run)."
+        )
     targets = tuple(
         ensemble_target(name, posterior, folder) if names_ensemble(name) else target_named(name, posterior.model)
         for name in dict.fromkeys(settings.targets)

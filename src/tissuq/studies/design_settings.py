@@ -46,7 +46,7 @@ class DesignSettings(RunSettings):
     )
     specimen: Literal["same", "other"] | None = option(
         None,
-        "The next test is of the same specimen or of the other ones [same, unless there are several].",
+        "The next test is of the same specimen or of another one [other where the fit has errors of tests, else same].",
         name="next-specimen",
     )
     seed: int = seed()
