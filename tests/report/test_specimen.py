@@ -1,11 +1,14 @@
 """The result of a fit of one material: its answer, comparison and files."""
 
 import json
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+import tissuq as tq
 from tissuq.report.result import Table
-from tissuq.report.specimen import specimen_answer, specimen_result
+from tissuq.report.specimen import _of_what, specimen_answer, specimen_result
 from tissuq.report.writer import read_record, write_result
 
 
@@ -67,3 +70,12 @@ def test_nothing_is_drawn_and_no_band_computed_where_no_figures_are_wanted(
     write_result(specimen_result(specimen_study, [specimen_file]), tmp_path, figures=False)
     assert "chart-data" not in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "assessment.json").read_text())[0]["formulation"] == "constant"
+
+
+def test_intervals_that_are_not_of_the_same_are_said_to_be_so():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, np.linspace(0.8, 1.3, 15), noise_sd=0.002, seed=3)
+    fits = {name: tq.fit(data, discrepancy=name) for name in ("none", "constant")}
+    words = _of_what(SimpleNamespace(posteriors=fits))
+    assert "those of none are of this specimen, errors of the test included" in words
+    assert "those of constant are of this specimen as tested" in words
+    assert _of_what(SimpleNamespace(posteriors={"none": fits["none"]})) == ""
