@@ -25,7 +25,7 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert len(set(constants)) == 6
     draws = rows_of(here / "out" / "draws.csv")
     assert [float(row["force"]) for row in draws] == pytest.approx(constants, rel=1e-8)
-    assert [1e3 * float(row["C10"]) for row in draws] == pytest.approx(constants, rel=1e-8)
+    assert [float(row["C10 [kPa]"]) for row in draws] == pytest.approx(constants, rel=1e-8)
     summary = json.loads((here / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["quantities"]["force"]["mean"] == pytest.approx(np.mean(constants), rel=1e-8)
     assert summary["quantities"]["force"]["sd"] == pytest.approx(np.std(constants, ddof=1), rel=1e-6)
@@ -153,7 +153,7 @@ def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, m
     said = cli("ensemble", *model, "--replace", "fat=runs/other", "--no-figures")
     assert said.status == 0, said.err
     rows = rows_of(here / "out" / "draws.csv")
-    pairs = np.array([[float(row["TISSUE.C10"]), float(row["fat.C10"])] for row in rows])
+    pairs = np.array([[float(row["TISSUE.C10 [MPa]"]), float(row["fat.C10 [MPa]"])] for row in rows])
     assert abs(np.corrcoef(pairs.T)[0, 1]) < 0.95  # one sequence for both would order them alike
     text = (here / "out" / "draws" / "complete-1" / "model.inp").read_text(encoding="utf-8")
     assert text.count("*HYPERELASTIC") == 2

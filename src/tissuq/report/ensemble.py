@@ -15,6 +15,7 @@ import numpy as np
 from tissuq.decks import FunctionQuantity
 from tissuq.decks.fields import FinalFields
 from tissuq.decks.model_run import FIELDS
+from tissuq.experiments.units import stress_unit
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
@@ -191,15 +192,17 @@ def _finer(study: EnsembleStudy) -> dict[str, Any] | None:
 
 
 def _draw_rows(study: EnsembleStudy) -> list[dict[str, Any]]:
-    """Return a row for every draw: parameters, last values, and why it failed."""
-    result, ensembles = study.result, study.prepared.ensembles
+    """Return a row for every draw: parameters in the unit of the cards, last values, and why it failed."""
+    result, ensembles, unit = study.result, study.prepared.ensembles, stress_unit(study.prepared.settings.unit)
     problems = {failure.number: failure.problem for failure in result.failures if failure.family == COMPLETE}
     rows = []
     for number in range(result.draws):
         row: dict[str, Any] = {"draw": number + 1}
         for material, ensemble in ensembles.items():
             prefix = f"{material}." if len(ensembles) > 1 else ""
-            row |= {f"{prefix}{symbol}": value for symbol, value in ensemble[number].values.items()}
+            for parameter in ensemble.model.material.parameters:
+                value, heading = ensemble[number].values[parameter.symbol], f"{prefix}{parameter.symbol}"
+                row |= {f"{heading} [{unit.name}]": value / unit.to_mpa} if parameter.unit else {heading: value}
         for name in result.curves:
             value = float(result.last_values(name)[number])
             row[name] = value if np.isfinite(value) else ""
