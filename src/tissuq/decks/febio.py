@@ -15,6 +15,8 @@ __all__ = ["FEBioDeck"]
 TYPE = re.compile(r"""(\stype\s*=\s*)("[^"]*"|'[^']*')""")
 DENSITY = re.compile(r"<density\b[^>]*>[^<]*</density>")
 SHARED = "rigid body"
+TIME_DEPENDENT = re.compile("visco|phasic|reactive|relax|damage|plastic|growth|remodel|osmo|perfusion|active|prestrain")
+"""Types of materials that have fluid, time or history besides elasticity."""
 
 KEPT = ("density", "mat_axis")
 """What stays of a material; its axes where the card has fibres."""
@@ -131,7 +133,13 @@ def _material(text: str, kept: list[str], attributes: dict[str, str], span: tupl
     head = text[: text.index(">") + 1]
     if head.endswith("/>"):
         head = head[:-2].rstrip() + ">"
-    refused = "" if attributes.get("type") != SHARED else "it is a rigid body."
+    kind = attributes.get("type", "")
+    refused = "it is a rigid body." if kind == SHARED else ""
+    if TIME_DEPENDENT.search(kind):
+        refused = (
+            f"type '{kind}' does more than an elastic material, which would be lost with it. Name an elastic material, "
+            "or write an elastic one in its place where that is meant."
+        )
     return DeckMaterial(
         attributes.get("name", ""), attributes.get("id", ""), (span,), (head, *kept), refused,
     )  # fmt: skip
