@@ -205,11 +205,13 @@ DECK = """*INCLUDE, INPUT=points.inp
 """
 
 
-def test_a_deck_gives_its_mesh_and_its_sets(tmp_path):
+@pytest.mark.parametrize("written", [str, str.lower])
+def test_a_deck_gives_its_mesh_and_its_sets(tmp_path, written):
     (tmp_path / "points.inp").write_text(
         "*NODE\n" + "".join(f"{n + 1}, {n % 3}., {n // 3}.\n" for n in range(6)), encoding="utf-8"
     )
-    (tmp_path / "disc.inp").write_text(DECK, encoding="utf-8")
+    elements = "*ELEMENT, TYPE=CAX4H"
+    (tmp_path / "disc.inp").write_text(DECK.replace(elements, written(elements)), encoding="utf-8")
     found = read_mesh(tmp_path / "disc.inp")
     assert found.cells.tolist() == [[0, 1, 4, 3], [1, 2, 5, 4]]
     assert {name: members.tolist() for name, members in found.sets.items()} == {

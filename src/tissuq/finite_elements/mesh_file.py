@@ -19,6 +19,8 @@ __all__ = ["AXES", "NEARLY", "MeshFile", "deck_text", "read_mesh"]
 
 AXES = "xyz"
 INCLUDE = re.compile(r"^\*INCLUDE\s*,\s*INPUT\s*=\s*(?P<file>[^\n]+)$", re.IGNORECASE | re.MULTILINE)
+ELEMENT_TYPE = re.compile(r"(^\*element\b[^\n]*\btype\s*=\s*)(\w+)", re.IGNORECASE | re.MULTILINE)
+"""The type of elements, which programs know in any case."""
 PLANE_ELEMENT = re.compile(r"(TYPE\s*=\s*)(?:CAX|CPE|CPS)([468])\w*", re.IGNORECASE)
 AS_MESHIO_KNOWS_IT = {"4": "CPS4", "6": "CPE6", "8": "S8R"}
 NEARLY = 1e-6
@@ -79,6 +81,7 @@ def deck_text(path: Path, depth: int = 0) -> str:
         raise ValueError("files include each other")
     text = path.read_text(encoding="utf-8", errors="replace").replace("\r\n", "\n")
     text = INCLUDE.sub(lambda match: deck_text(path.parent / match["file"].strip(), depth + 1).rstrip("\n"), text)
+    text = ELEMENT_TYPE.sub(lambda match: match[1] + match[2].upper(), text)
     return PLANE_ELEMENT.sub(lambda match: match[1] + AS_MESHIO_KNOWS_IT[match[2]], text)
 
 

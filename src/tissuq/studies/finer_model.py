@@ -86,6 +86,10 @@ def finer_model(
         raise InputError(
             f"the finer model (--finer-model) must have the materials and sets of the model: {error}"
         ) from error
+    if list(finer.files.values()) == list(deck.files.values()):
+        raise InputError(
+            f"the finer model (--finer-model) '{finer.main}' is the model itself: give one with a finer mesh."
+        )
     number, order = _middle_draw(ensembles), settings.mesh_order or 1.0
     if settings.cell_ratio is not None:
         return FinerModel(finer, number, settings.cell_ratio, order)
