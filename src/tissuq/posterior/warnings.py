@@ -15,7 +15,9 @@ from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
+from tissuq.model.measurement_errors import ScaleError, TestError
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.tolerances import ESTIMANDS
 from tissuq.parameters.priors import Uniform
 from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.result_warning import ResultWarning, Severity
@@ -230,18 +232,22 @@ def _tests_apart(solution: Solution) -> str:
     curve, start, factors = _mean_curve(solution), 0, []
     for test in tests:
         own = curve[start : start + test.size]
-        factors.append(float(test.measured @ own / (own @ own)))
+        factors.append(float(test.measured @ own / (own @ own)) if own.any() else 1.0)
         start += test.size
     lowest, highest = int(np.argmin(factors)), int(np.argmax(factors))
     is_one_specimen = bool(tests[lowest].specimen) and tests[lowest].specimen == tests[highest].specimen
-    sd = np.sqrt(2) * np.hypot(tolerances.test, 0.0 if is_one_specimen else tolerances.stress)
-    if factors[lowest] > 0 and np.log(factors[highest] / factors[lowest]) <= MAX_SDS_APART * sd:
+    standard = ESTIMANDS[tolerances.estimand].sizes if tolerances.estimand else {}  # told ones may be as small as noise
+    of_specimens, of_tests = (
+        max(tolerances.sizes.get(name, 0.0), standard.get(name, 0.0)) for name in (ScaleError.name, TestError.name)
+    )
+    spread = np.hypot(of_tests, 0.0 if is_one_specimen else of_specimens)
+    if factors[lowest] > 0 and np.log(factors[highest] / factors[lowest]) <= MAX_SDS_APART * np.sqrt(2) * spread:
         return ""
     names = [test.name or f"test {number}" for number, test in enumerate(tests, 1)]
     return (
         f"the tests contradict each other: the stress of '{names[highest]}' is {factors[highest]:.2g} times that of "
         f"one material for all, and that of '{names[lowest]}' {factors[lowest]:.2g} times, farther apart than the "
-        f"spread of {np.hypot(tolerances.stress, tolerances.test):.0%} that is assumed. The interval may hold neither. "
+        f"spread of {spread:.0%} that is assumed. The interval may hold neither. "
         "See whether units, areas, grips, friction, direction or the state of the specimens differed, and fit each by "
         "itself."
     )
