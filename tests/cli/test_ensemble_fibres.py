@@ -70,8 +70,8 @@ def test_a_deck_must_name_its_material_as_calculix_asks(cli, here, sheet):
 
 def test_a_draw_of_fibres_is_chosen_for_a_finer_model(cli, here, sheet):
     sheet(MATERIAL)
-    for name in ("cube.inp", "fine.inp"):
-        (here / name).write_text(DECK)
+    (here / "cube.inp").write_text(DECK)
+    (here / "fine.inp").write_text(f"** of smaller elements\n{DECK}")
     words = ["--qoi", "force=RF1@TIP", "--draws", 4, "--finer-model", "fine.inp", "--cell-ratio", 2, "--dry-run"]
     said = cli("ensemble", "runs/sheet", "cube.inp", "--replace", "ELASTIC_FIBER_WALL", *words)
     assert said.status == 0, said.err

@@ -345,4 +345,4 @@ def test_the_same_measurements_do_not_count_twice_and_empty_tests_are_named():
     with pytest.raises(tq.InputError, match="experiment 'nothing': every stress is zero"):
         tq.fit([parts[0], nothing])
     with pytest.raises(tq.InputError, match="tolerances must be such as"):
-        tq.fit(parts, tolerances={"stress": 0.1})
+        tq.fit(parts, tolerances=0.1)

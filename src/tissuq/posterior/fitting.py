@@ -185,8 +185,8 @@ def fit_many(
         tolerances = None
     if tolerances is not None and not isinstance(tolerances, Tolerances):
         raise InputError(
-            f"tolerances must be such as tissuq.Tolerances(stress=0.1), or one of {', '.join(ESTIMANDS)}, not "
-            f"{tolerances!r}."
+            "tolerances must be such as {'slack': 0.01} or tissuq.Tolerances(stress=0.1), or one of "
+            f"{', '.join(ESTIMANDS)}, not {tolerances!r}."
         )
     if method not in METHODS:
         raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
