@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["factors_of_tests", "measurement_warnings"]
+__all__ = ["factors_of_tests", "labels_of_tests", "measurement_warnings"]
 
 MIN_MEASUREMENTS = 12
 """Smallest number of measurements that describe how the stress deviates from the material."""
@@ -74,9 +74,13 @@ def factors_of_tests(solution: Solution) -> dict[str, float]:
     noise = whitening.size**2 * whitening.transposed(whitening(residual))
     ends = np.cumsum([test.size for test in tests])[:-1]
     pairs = zip(np.split(residual - noise, ends), np.split(curve, ends), strict=True)
-    names = [test.name for test in tests]
-    labels = [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]
     return {
         label: 1 + float(error @ test_curve / (test_curve @ test_curve))
-        for label, (error, test_curve) in zip(labels, pairs, strict=True)
+        for label, (error, test_curve) in zip(labels_of_tests(tests), pairs, strict=True)
     }
+
+
+def labels_of_tests(tests: Sequence[Experiment]) -> list[str]:
+    """Return the names of tests, those of the same name numbered by their places among all."""
+    names = [test.name for test in tests]
+    return [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]

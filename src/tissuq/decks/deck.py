@@ -16,7 +16,10 @@ from typing import ClassVar, NamedTuple
 from tissuq.errors import InputError
 from tissuq.registry import find, variants
 
-__all__ = ["Deck", "DeckFormat", "DeckMaterial", "Line", "MeshSize", "deck_formats", "decoded", "encoded", "lines_of"]
+__all__ = [
+    "MORE_THAN_ELASTIC", "Deck", "DeckFormat", "DeckMaterial", "Line", "MeshSize", "deck_formats", "decoded", "encoded",
+    "lines_of",
+]  # fmt: skip
 
 CONTEXT = 3
 """Lines around a difference that are shown."""
@@ -49,6 +52,12 @@ def lines_of(content: bytes) -> Iterator[Line]:
     for line in content.splitlines(keepends=True):
         yield Line(start, start + len(line), decoded(line).rstrip("\r\n"))
         start += len(line)
+
+
+MORE_THAN_ELASTIC = (
+    "which would be lost with it. Name an elastic material, or write an elastic one in its place where that is meant."
+)
+"""End of the reason why a material with more than an elasticity is refused."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from xml.parsers.expat import ExpatError, ParserCreate
 
-from tissuq.decks.deck import DeckFormat, DeckMaterial, MeshSize, decoded
+from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, MeshSize, decoded
 from tissuq.errors import InputError
 
 __all__ = ["FEBioDeck"]
@@ -15,7 +15,9 @@ __all__ = ["FEBioDeck"]
 TYPE = re.compile(r"""(\stype\s*=\s*)("[^"]*"|'[^']*')""")
 DENSITY = re.compile(r"<density\b[^>]*>[^<]*</density>")
 SHARED = "rigid body"
-TIME_DEPENDENT = re.compile("visco|phasic|reactive|relax|damage|plastic|growth|remodel|osmo|perfusion|active|prestrain")
+NOT_ELASTIC_ALONE = re.compile(
+    "visco|phasic|reactive|relax|damage|plastic|growth|remodel|osmo|perfusion|active|prestrain"
+)
 """Types of materials that have fluid, time or history besides elasticity."""
 
 KEPT = ("density", "mat_axis")
@@ -135,11 +137,8 @@ def _material(text: str, kept: list[str], attributes: dict[str, str], span: tupl
         head = head[:-2].rstrip() + ">"
     kind = attributes.get("type", "")
     refused = "it is a rigid body." if kind == SHARED else ""
-    if TIME_DEPENDENT.search(kind):
-        refused = (
-            f"type '{kind}' does more than an elastic material, which would be lost with it. Name an elastic material, "
-            "or write an elastic one in its place where that is meant."
-        )
+    if NOT_ELASTIC_ALONE.search(kind):
+        refused = f"type '{kind}' does more than an elastic material, {MORE_THAN_ELASTIC}"
     return DeckMaterial(
         attributes.get("name", ""), attributes.get("id", ""), (span,), (head, *kept), refused,
     )  # fmt: skip

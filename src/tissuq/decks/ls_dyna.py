@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
-from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, Line, lines_of
 
 __all__ = ["LSDynaDeck"]
 
 NOT_ELASTIC = ("*MAT_ADD", "*MAT_THERMAL", "*MAT_NONLOCAL")
 """Keywords that belong to another one, or to the temperature."""
-TIME_DEPENDENT = re.compile(r"VISCO|CREEP|_0?(06|61|76|92|134|164|175|176)(?!\d)")
+VISCOELASTIC = re.compile(r"VISCO|CREEP|_0?(06|61|76|92|134|164|175|176)(?!\d)")
 """Names, and numbers, of viscoelastic materials."""
 WIDTH, LONG = 10, 20
 """Columns of a field, and in the long format."""
@@ -45,12 +45,7 @@ class LSDynaDeck(DeckFormat):
                 row = data[1 if is_titled and len(data) > 1 else 0].text
                 number, density = _fields(row, LONG if re.search(r"\s\+\s*$", keyword.text) else WIDTH)
                 span = keyword.start, data[-1].end
-                refused = ""
-                if TIME_DEPENDENT.search(name):
-                    refused = (
-                        f"{name} depends on time, which would be lost with it. Name an elastic material, or write an "
-                        "elastic one in its place where that is meant."
-                    )
+                refused = f"{name} depends on time, {MORE_THAN_ELASTIC}" if VISCOELASTIC.search(name) else ""
                 materials.append(DeckMaterial(title.strip(), number, (span,), (title, number, density), refused))
         return materials
 

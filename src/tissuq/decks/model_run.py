@@ -119,7 +119,7 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     sets = sets_of(deck, task.quantities)
     asked = tuple((quantity.kind, quantity.set_name) for quantity in task.quantities if isinstance(quantity, Component))
     program = task.abaqus or shlex.quote(task.solver.words(deck.job, deck.main)[0])
-    is_ring = bool(asked) and deck.format.is_axisymmetric(list(deck.files.values()))
+    is_ring = any(kind == "RF" for kind, _ in asked) and deck.format.is_axisymmetric(list(deck.files.values()))
     results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets, asked, program, is_ring)
     curves, misread = _curves(task, results)
     beyond = None

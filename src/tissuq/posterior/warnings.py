@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
+from tissuq.assessment.measurements import labels_of_tests
 from tissuq.assessment.modulus import modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
@@ -229,11 +230,11 @@ def _tests_apart(solution: Solution) -> str:
     tolerances, is_said = model.tolerances, bool(model.fitted_errors.contradiction)
     if len(tests) < 2 or not (tolerances.stress or tolerances.test) or not model.energy_symbols or is_said:
         return ""
-    curve, start, factors = _mean_curve(solution), 0, []
-    for test in tests:
-        own = curve[start : start + test.size]
-        factors.append(float(test.measured @ own / (own @ own)) if own.any() else 1.0)
-        start += test.size
+    curves = np.split(_mean_curve(solution), np.cumsum([test.size for test in tests])[:-1])
+    factors = [
+        float(test.measured @ curve / (curve @ curve)) if curve.any() else 1.0
+        for test, curve in zip(tests, curves, strict=True)
+    ]
     lowest, highest = int(np.argmin(factors)), int(np.argmax(factors))
     is_one_specimen = bool(tests[lowest].specimen) and tests[lowest].specimen == tests[highest].specimen
     standard = ESTIMANDS[tolerances.estimand].sizes if tolerances.estimand else {}  # told ones may be as small as noise
@@ -243,7 +244,7 @@ def _tests_apart(solution: Solution) -> str:
     spread = np.hypot(of_tests, 0.0 if is_one_specimen else of_specimens)
     if factors[lowest] > 0 and np.log(factors[highest] / factors[lowest]) <= MAX_SDS_APART * np.sqrt(2) * spread:
         return ""
-    names = [test.name or f"test {number}" for number, test in enumerate(tests, 1)]
+    names = labels_of_tests(tests)
     return (
         f"the tests contradict each other: the stress of '{names[highest]}' is {factors[highest]:.2g} times that of "
         f"one material for all, and that of '{names[lowest]}' {factors[lowest]:.2g} times, farther apart than the "

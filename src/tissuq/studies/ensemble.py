@@ -194,10 +194,11 @@ def drawn_materials(
     for name, run in settings.materials.items():
         step(f"draws of {name}")
         posterior = load(beside / run, settings.discrepancy, law)
-        seed, sampling = settings.seed + runs.index(run), cast("Sampling", settings.sampling)
+        number, sampling = runs.index(run), cast("Sampling", settings.sampling)
+        seed = settings.seed + number
         ensemble = posterior.ensemble(settings.draws, seed, sampling, admissible=not settings.all_draws)
         # Materials of different runs are independent: draws that are spread alike are paired at random.
-        ensembles[name] = ensemble.shuffled([settings.seed, runs.index(run)]) if run != runs[0] else ensemble
+        ensembles[name] = ensemble.shuffled([settings.seed, number]) if number else ensemble
     return ensembles
 
 

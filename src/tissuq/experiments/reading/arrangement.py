@@ -151,7 +151,7 @@ def _goes_on(first_row: str, table: Table, later: Table) -> bool:
     times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
     if not times:
         return not later.title and _goes_on_evenly(first_row, table, later)
-    ends = table.taken(np.array([0, len(table.rows) - 1]))
+    ends = replace(table, rows=[first_row, table.rows[-1]], lines=[table.lines[0], table.lines[-1]])
     return all(
         earlier[0] < earlier[-1] <= continued[0]
         for earlier, continued in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)

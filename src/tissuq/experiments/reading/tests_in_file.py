@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack, cast
 
@@ -301,16 +302,20 @@ def _without_what_others_need(
     InputError
         When it cannot be read without them either: the error with them.
     """
-    sizes = options.get("dimensions") or {}
+    sizes, is_positive = options.get("dimensions") or {}, options.get("compression_positive")
     of_section = {name: size for name, size in sizes.items() if name != "length"}
     of_length = {name: size for name, size in sizes.items() if name == "length"}
-    for compression_positive in dict.fromkeys([options.get("compression_positive"), None]):
-        for dimensions in (sizes, of_section, of_length, {}):
-            of_test: ReadingOptions = {
-                **options, "dimensions": dimensions or None, "compression_positive": compression_positive
-            }  # fmt: skip
-            with suppress(InputError):
-                return read_rows(table, path, words, **of_test), of_test
+    refused = [(is_positive, sizes)]
+    for choice in product((is_positive, None), (sizes, of_section, of_length, {})):
+        if choice in refused:
+            continue
+        refused.append(choice)
+        compression_positive, dimensions = choice
+        of_test: ReadingOptions = {
+            **options, "dimensions": dimensions or None, "compression_positive": compression_positive
+        }  # fmt: skip
+        with suppress(InputError):
+            return read_rows(table, path, words, **of_test), of_test
     raise error
 
 
