@@ -1,4 +1,4 @@
-"""Files of measurements, what the command line gives the page, and a page that is served."""
+"""Files of measurements, and a page that is served."""
 
 from __future__ import annotations
 
@@ -15,24 +15,13 @@ import pytest
 pytest.importorskip("starlette", reason="the extra 'app' is not installed")
 pytest.importorskip("uvicorn", reason="the extra 'app' is not installed")
 
-from tissuq.app.shell_forms import ShellForms
-from tissuq.cli.answers import answers_in, with_options
-from tissuq.cli.reading import find_tests, measured, run_name
 
 SERVED = """\
 from tissuq.app.server import serve
-from tissuq.app.shell_forms import ShellForms
-from tissuq.cli.answers import answers_in, with_options
-from tissuq.cli.reading import find_tests, measured, run_name
 if __name__ == "__main__":
-    serve(ShellForms(measured, find_tests, answers_in, with_options, run_name), open_browser=False, grace=1.0)
+    serve(open_browser=False, grace=1.0)
 """
 """As ``tissuq app --no-browser``, but for how long it waits for a page that has gone."""
-
-
-@pytest.fixture
-def forms():
-    return ShellForms(measured, find_tests, answers_in, with_options, run_name)
 
 
 @pytest.fixture

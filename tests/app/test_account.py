@@ -11,16 +11,16 @@ import tissuq as tq
 from tissuq.app.account import account
 
 
-def taken(forms, file, question, label, reading=None, mode=None):
+def taken(file, question, label, reading=None, mode=None):
     """Return what is understood once the answer of a label is taken, as the page takes it."""
     settings = dict(next(answer for answer in question["answers"] if answer["label"] == label)["settings"])
     mode = settings.pop("mode", mode)
-    return account(forms, [file], {**(reading or {}), **settings}, [mode])
+    return account([file], {**(reading or {}), **settings}, [mode])
 
 
-def test_the_curve_that_is_drawn_is_what_was_measured(forms, here, write_stretches):
+def test_the_curve_that_is_drawn_is_what_was_measured(here, write_stretches):
     write_stretches(here)
-    found = account(forms, ["kidney.csv"], {}, ["uniaxial"])
+    found = account(["kidney.csv"], {}, ["uniaxial"])
     (test,) = found["tests"]
     rows = np.loadtxt("kidney.csv", delimiter=",", skiprows=1).T
     for drawn in ("used", "recorded"):
@@ -32,26 +32,26 @@ def test_the_curve_that_is_drawn_is_what_was_measured(forms, here, write_stretch
     json.dumps(found, allow_nan=False)
 
 
-def test_an_unstated_unit_and_mode_are_questions_and_their_answers_settle_them(forms, here, write_stretches):
+def test_an_unstated_unit_and_mode_are_questions_and_their_answers_settle_them(here, write_stretches):
     write_stretches(here, heading="stretch,stress")
-    found = account(forms, ["kidney.csv"], {}, [None])
+    found = account(["kidney.csv"], {}, [None])
     unit, mode = found["questions"]
     assert "MPa was assumed" in unit["plain"]
     assert "--" not in unit["plain"]
     assert [answer["label"] for answer in unit["answers"]] == ["stresses are in kPa", "stresses are in MPa"]
-    mended = taken(forms, "kidney.csv", unit, "stresses are in kPa")
+    mended = taken("kidney.csv", unit, "stresses are in kPa")
     assert mended["tests"][0]["unit"] == "kPa"
     assert [question["text"] for question in mended["questions"]] == [mode["text"]]
-    planar = taken(forms, "kidney.csv", mode, "planar", {"stress_unit": "kPa"})
+    planar = taken("kidney.csv", mode, "planar", {"stress_unit": "kPa"})
     assert (planar["tests"][0]["mode"], planar["questions"]) == ("planar", [])
 
 
-def test_a_length_that_is_missing_is_asked_for_and_makes_the_stretches_right(forms, here, write_machine):
+def test_a_length_that_is_missing_is_asked_for_and_makes_the_stretches_right(here, write_machine):
     write_machine(here)
-    error = account(forms, ["skin.csv"], {}, ["uniaxial"])["error"]
+    error = account(["skin.csv"], {}, ["uniaxial"])["error"]
     (answer,) = error["answers"]
     assert answer["asked_for"] == ["length"]
-    found = account(forms, ["skin.csv"], {"dimensions": {"length": "12 mm"}}, ["uniaxial"])
+    found = account(["skin.csv"], {"dimensions": {"length": "12 mm"}}, ["uniaxial"])
     (test,) = found["tests"]
     assert test["range"] == pytest.approx([1, 1 + 4 / 12], rel=1e-5)
     drawn = test["curves"][0]["used"]
@@ -59,28 +59,28 @@ def test_a_length_that_is_missing_is_asked_for_and_makes_the_stretches_right(for
     np.testing.assert_allclose(20 * (stretch - stretch**-2), expected, atol=0.3)
 
 
-def test_a_finding_has_a_button_that_mends_it(forms, here, write_machine):
+def test_a_finding_has_a_button_that_mends_it(here, write_machine):
     write_machine(here)
     reading = {"dimensions": {"length": "12 mm"}}
-    (finding,) = account(forms, ["skin.csv"], reading, ["uniaxial"])["findings"]
+    (finding,) = account(["skin.csv"], reading, ["uniaxial"])["findings"]
     assert "loading and unloading differ" in finding["plain"]
     (answer,) = finding["answers"]
     assert answer == {"label": "take only loading", "settings": {"branch": "loading"}}
-    mended = account(forms, ["skin.csv"], reading | answer["settings"], ["uniaxial"])
+    mended = account(["skin.csv"], reading | answer["settings"], ["uniaxial"])
     assert (mended["tests"][0]["rows"], mended["findings"]) == (60, [])
 
 
-def test_a_column_that_is_not_known_can_be_chosen(forms, here, write_stretches):
+def test_a_column_that_is_not_known_can_be_chosen(here, write_stretches):
     write_stretches(here, heading="stretch,result")
-    error = account(forms, ["kidney.csv"], {}, ["uniaxial"])["error"]
+    error = account(["kidney.csv"], {}, ["uniaxial"])["error"]
     assert "stress is in column 'result'" in [answer["label"] for answer in error["answers"]]
-    found = taken(forms, "kidney.csv", error, "stress is in column 'result'", mode="uniaxial")
+    found = taken("kidney.csv", error, "stress is in column 'result'", mode="uniaxial")
     assert found["tests"][0]["roles"]["result"] == "stress"
 
 
-def test_a_file_that_holds_no_measurements_is_refused_with_the_message_of_the_command_line(forms, here):
+def test_a_file_that_holds_no_measurements_is_refused_with_the_message_of_the_command_line(here):
     (here / "bad.csv").write_text("hello,world\nfoo,bar\n")
-    found = account(forms, ["bad.csv"], {}, [None])
+    found = account(["bad.csv"], {}, [None])
     with pytest.raises(tq.InputError) as refusal:
         tq.read("bad.csv")
     assert found["error"]["text"] == str(refusal.value)

@@ -25,10 +25,10 @@ EVERY_OPTION = {
 }  # fmt: skip
 
 
-def done(task, forms, request):
+def done(task, request):
     """Return what a task says, by kind."""
     said = {}
-    TASKS[task](forms, request, lambda kind, data: said.update({kind: data}))
+    TASKS[task](request, lambda kind, data: said.update({kind: data}))
     return said
 
 
@@ -81,13 +81,13 @@ def test_false_is_written_as_its_own_switch():
 
 
 @pytest.mark.slow
-def test_a_fit_is_repeated_by_its_command_and_by_its_python(forms, here, write_stretches, monkeypatch):
+def test_a_fit_is_repeated_by_its_command_and_by_its_python(here, write_stretches, monkeypatch):
     write_stretches(here)
     request = {
         "files": ["kidney.csv"], "modes": ["uniaxial"], "reading": {"stretch_range": [1.05, 1.4]},
         "discrepancies": ["none"], "noise_sd": 0.05,
     }  # fmt: skip
-    said = done("fit", forms, request)
+    said = done("fit", request)
     (modulus, _) = said["answer"]["numbers"]
     assert modulus["low"] < 10 < modulus["high"]
     assert "--stretch 1.05:1.4" in said["answer"]["repeat"]["shell"]
@@ -95,30 +95,30 @@ def test_a_fit_is_repeated_by_its_command_and_by_its_python(forms, here, write_s
 
 
 @pytest.mark.slow
-def test_a_fit_of_a_mended_file_is_repeated(forms, here, write_machine, monkeypatch):
+def test_a_fit_of_a_mended_file_is_repeated(here, write_machine, monkeypatch):
     write_machine(here, "skin 1.csv")
     reading = {"dimensions": {"length": "12 mm"}, "branch": "loading", "preload": "auto"}
     request = {"files": ["skin 1.csv"], "modes": ["uniaxial"], "reading": reading, "material": "yeoh"}
-    check_repeats(done("fit", forms, request | {"estimand": "tissue"}), monkeypatch)
+    check_repeats(done("fit", request | {"estimand": "tissue"}), monkeypatch)
 
 
 @pytest.mark.slow
-def test_a_fit_of_several_files_is_repeated(forms, here, write_stretches, monkeypatch):
+def test_a_fit_of_several_files_is_repeated(here, write_stretches, monkeypatch):
     write_stretches(here, "a.csv")
     write_stretches(here, "b.csv", c10=6.0)
     request = {"files": ["a.csv", "b.csv"], "modes": ["uniaxial", "planar"], "discrepancies": ["none"]}
-    said = done("fit", forms, request)
+    said = done("fit", request)
     assert said["answer"]["run"] == "a-and-1-more"
     check_repeats(said, monkeypatch)
 
 
 @pytest.mark.slow
-def test_laws_predictions_and_cards_are_repeated(forms, here, write_stretches, monkeypatch):
+def test_laws_predictions_and_cards_are_repeated(here, write_stretches, monkeypatch):
     write_stretches(here)
     measured = {"files": ["kidney.csv"], "modes": ["uniaxial"], "discrepancies": ["none"]}
-    run = done("fit", forms, measured)["done"]["run"]
+    run = done("fit", measured)["done"]["run"]
 
-    shown = done("laws", forms, measured | {"laws": ["neo-hookean", "yeoh"]})["done"]
+    shown = done("laws", measured | {"laws": ["neo-hookean", "yeoh"]})["done"]
     table = executed(shown["repeat"]["python"])["comparison"].table
     assert [row[0] for row in shown["rows"]] == list(table.index)
     moduli = [float(row[1]) for row in shown["rows"]]
@@ -128,7 +128,7 @@ def test_laws_predictions_and_cards_are_repeated(forms, here, write_stretches, m
     assert [row["law"] for row in stored] == list(table.index)
     assert [row["modulus"] for row in stored] == pytest.approx(table["modulus"].tolist(), rel=1e-9)
 
-    shown = done("predict", forms, {"run": run, "mode": "planar", "stretch": "1:1.2"})["done"]
+    shown = done("predict", {"run": run, "mode": "planar", "stretch": "1:1.2"})["done"]
     before = Path("runs/kidney-planar/prediction.csv").read_text()
     (header, *_), table = before.splitlines(), executed(shown["repeat"]["python"])["prediction"].table
     assert header.split(",")[0] == table.columns[0] == "stretch"
@@ -138,7 +138,7 @@ def test_laws_predictions_and_cards_are_repeated(forms, here, write_stretches, m
     closed_form = 10 * (1.2 - 1.2**-3)
     assert table[median].iloc[-1] == pytest.approx(closed_form, rel=0.05)
 
-    shown = done("export", forms, {"run": run, "format": "abaqus", "draws": 3, "unit": "kPa"})["done"]
+    shown = done("export", {"run": run, "format": "abaqus", "draws": 3, "unit": "kPa"})["done"]
     folder = Path(shown["folder"])
     cards = {name: (folder / name).read_text() for name in shown["files"]}
     for repeat in (

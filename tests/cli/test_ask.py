@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 import tissuq as tq
-from tissuq.cli.answers import answers_in, options_in
 from tissuq.cli.app import app
 from tissuq.errors import InputError
+from tissuq.studies.answers import answers_in, options_in
 from tissuq.studies.settings import load_settings
 from tissuq.studies.specimen import SpecimenSettings
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.app.shell_forms import Proposal, ShellForms
 from tissuq.errors import TissuqError
 from tissuq.experiments.modes import loading_modes
 from tissuq.experiments.reading.inspection import Inspection, overview
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
-from tissuq.experiments.reading.tables import read_tables
 from tissuq.experiments.units import stress_unit
+from tissuq.studies.answers import Answer, answers_in, with_options
+from tissuq.studies.files_of_tests import find_tests, tables_of, tests_in_words
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -49,14 +49,11 @@ WORDS = {
 """What options mean, for a person who clicks on them."""
 
 
-def account(
-    forms: ShellForms, files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[str | None]
-) -> dict[str, Any]:
+def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[str | None]) -> dict[str, Any]:
     """Return what was understood of files, or why they are not, in plain data.
 
     Parameters
     ----------
-    forms : ShellForms
     files : sequence of str
         In the current folder.
     reading : mapping
@@ -65,17 +62,17 @@ def account(
         The loading mode of each; None where it is to say itself.
     """
     paths = list(map(Path, files))
-    tables = {file: list(map(_table, _tables(file, reading))) for file in files}
+    tables = {file: list(map(_table, tables_of(Path(file), reading))) for file in files}
     columns = list(dict.fromkeys(column["name"] for of_file in tables.values() for table in of_file
                                  for column in table["columns"]))  # fmt: skip
     found: dict[str, Any] = {"tables": tables, "text": "", "tests": [], "findings": [], "questions": [], "error": None}
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path, mode in zip(paths, modes, strict=True):
         try:
-            tests += forms.find_tests(path, {**reading, "mode": mode}, is_only_file=len(files) == 1)
+            tests += find_tests(path, {**reading, "mode": mode}, is_only_file=len(files) == 1)
         except TissuqError as refusal:
             settings, start = {**reading, "mode": mode}, perf_counter()
-            asked = _question(forms, path, str(refusal), columns, settings, len(files), start, refused=True)
+            asked = _question(path, str(refusal), columns, settings, len(files), start, refused=True)
             found["error"] = asked | {"file": str(path)}
             break
     start = perf_counter()
@@ -85,12 +82,12 @@ def account(
         pairs = zip(tests, inspections, strict=True)
         found["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
         texts = dict.fromkeys(text for inspection in inspections for text in inspection.warnings)
-        found["findings"] = [_finding(forms, text, columns, reading) for text in texts]
+        found["findings"] = [_finding(text, columns, reading) for text in texts]
         for (settings, of_test), mode in zip(tests, _modes_of(tests, files, modes), strict=True):
             path = Path(settings["file"])
             for text in of_test.doubts:
                 if text not in [question["text"] for question in found["questions"]]:
-                    asked = _question(forms, path, text, columns, {**reading, "mode": mode}, len(files), start)
+                    asked = _question(path, text, columns, {**reading, "mode": mode}, len(files), start)
                     found["questions"] += [asked | {"file": str(path)}] if asked["answers"] else []
         silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
         if silent:
@@ -108,15 +105,6 @@ def _modes_of(
 
 def _plain_mode(name: str, description: str) -> dict[str, Any]:
     return {"label": name, "gives": description, "settings": {"mode": name}, "asked_for": []}
-
-
-def _tables(file: str, reading: Mapping[str, Any]) -> list[Table]:
-    """Return the tables of a file, or nothing where it has none that can be read."""
-    path = Path(file) if Path(file).exists() else Path(file.partition("#")[0])
-    try:
-        return list(read_tables(path, reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")))
-    except TissuqError:
-        return []
 
 
 def _table(table: Table) -> dict[str, Any]:
@@ -178,11 +166,11 @@ def _points(stretch: Column, stress: Column, unit: Any) -> dict[str, list[float]
     return {"x": [float(f"{value:.6g}") for value in x[is_number]], "y": [float(f"{v:.6g}") for v in y[is_number]]}
 
 
-def _finding(forms: ShellForms, text: str, columns: Sequence[str], reading: Mapping[str, Any]) -> dict[str, Any]:
+def _finding(text: str, columns: Sequence[str], reading: Mapping[str, Any]) -> dict[str, Any]:
     """Return something strange about measurements with what it proposes, which a person may take or not."""
     answers = [
-        {"label": _in_words(proposal), "settings": _changes(reading, forms.with_proposal(reading, proposal))}
-        for proposal in forms.proposals_in(text, columns, reading)
+        {"label": _in_words(proposal), "settings": _changes(reading, with_options(reading, proposal))}
+        for proposal in answers_in(text, columns, reading)
         if not proposal.asked_for and not proposal.leaves_out
     ]
     is_open = len(answers) <= MAX_SHOWN
@@ -191,7 +179,6 @@ def _finding(forms: ShellForms, text: str, columns: Sequence[str], reading: Mapp
 
 
 def _question(
-    forms: ShellForms,
     file: Path,
     text: str,
     columns: Sequence[str],
@@ -204,17 +191,16 @@ def _question(
     """Return a message with the answers that it proposes, and what each of them would give."""
     answers: list[dict[str, Any]] = []
     later: list[dict[str, Any]] = []
-    for proposal in forms.proposals_in(text, columns, settings):
+    for proposal in answers_in(text, columns, settings):
         answer: dict[str, Any] = {"label": _in_words(proposal), "gives": "", "asked_for": list(proposal.asked_for)}
-        answer["settings"] = _changes(settings, forms.with_proposal(settings, proposal))
+        answer["settings"] = _changes(settings, with_options(settings, proposal))
         if proposal.asked_for:
             answers.append(answer)
             continue
         if perf_counter() - start < SECONDS_TO_TRY:
             try:
-                tests = forms.find_tests(file, forms.with_proposal(settings, proposal), is_only_file=count == 1)
-                more = f", and {len(tests) - 1} more tests" if len(tests) > 1 else ""
-                answer["gives"] = Inspection.of(tests[0][1]).line + more
+                tests = find_tests(file, with_options(settings, proposal), is_only_file=count == 1)
+                answer["gives"] = tests_in_words(tests)
             except TissuqError as refusal:
                 if str(refusal) == text or not refused:
                     continue
@@ -246,7 +232,7 @@ def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, A
     return {name: value for name, value in after.items() if before.get(name) != value}
 
 
-def _in_words(proposal: Proposal) -> str:
+def _in_words(proposal: Answer) -> str:
     if proposal.leaves_out:
         return proposal.text
     return ", ".join(_one_in_words(*option) for option in proposal.options)

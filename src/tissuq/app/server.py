@@ -18,7 +18,6 @@ from starlette.routing import Mount
 from tissuq.app.guard import Guard
 from tissuq.app.routes import routes
 from tissuq.app.sessions import GRACE, Sessions
-from tissuq.app.shell_forms import ShellForms
 from tissuq.app.workers import Workers
 from tissuq.errors import InputError
 
@@ -48,7 +47,6 @@ def _say(text: str) -> None:
 
 
 def serve(
-    forms: ShellForms,
     port: int = 0,
     *,
     open_browser: bool = True,
@@ -59,7 +57,6 @@ def serve(
 
     Parameters
     ----------
-    forms : ShellForms
     port : int
         0 for one that is free.
     open_browser : bool
@@ -77,7 +74,7 @@ def serve(
     port, token = listening.getsockname()[1], token_urlsafe(24)
     address = f"http://{LOOPBACK}:{port}/{token}/"
     with tempfile.TemporaryDirectory(prefix="tissuq-app-", ignore_cleanup_errors=True) as folder:
-        sessions = Sessions(Path(folder), Workers(forms, Path(folder)), grace)
+        sessions = Sessions(Path(folder), Workers(Path(folder)), grace)
 
         @asynccontextmanager
         async def lifespan(_: Starlette) -> AsyncIterator[None]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from tissuq.app.repeat import command, fit_lines, reading_words
-from tissuq.app.shell_forms import ShellForms
 from tissuq.errors import InputError
+from tissuq.studies.files_of_tests import measured, run_name
 from tissuq.studies.option_texts import column
 
 if TYPE_CHECKING:
@@ -23,7 +21,7 @@ Say = Callable[[str, Any], None]
 RUNS, CARDS = Path("runs"), Path("cards")
 
 
-def choices(_: ShellForms, __: Mapping[str, Any], say: Say) -> None:
+def choices(_: Mapping[str, Any], say: Say) -> None:
     """Say what there is to choose from."""
     from tissuq.experiments.modes import loading_modes
     from tissuq.export import card_formats
@@ -49,12 +47,12 @@ def choices(_: ShellForms, __: Mapping[str, Any], say: Say) -> None:
     )
 
 
-def inspect(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+def inspect(request: Mapping[str, Any], say: Say) -> None:
     """Say what is understood of files, and what repeats it."""
     from tissuq.app.account import account
 
     files, modes, reading = _files(request)
-    found = account(forms, files, reading, [mode or None for mode in modes or [""] * len(files)])
+    found = account(files, reading, [mode or None for mode in modes or [""] * len(files)])
     options = f", {', '.join(f'{name}={value!r}' for name, value in reading.items())}" if reading else ""
     of_files = [f", mode={mode!r}" if mode else "" for mode in modes or [""] * len(files)]
     prints = [f"print(tq.inspect({file!r}{options}{mode}))" for file, mode in zip(files, of_files, strict=True)]
@@ -62,7 +60,7 @@ def inspect(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     say("done", found | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
 
 
-def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+def fit(request: Mapping[str, Any], say: Say) -> None:
     """Fit a material; say the answer as soon as it is there, then write the run."""
     from tissuq.report.result import few_and_others
     from tissuq.report.run_folder import run_folder
@@ -72,7 +70,7 @@ def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     from tissuq.studies.specimen_settings import SpecimenSettings
 
     say("step", "reading")
-    values, found, name = _measured(forms, request)
+    values, found, name = _measured(request)
     options = _options(request, ("material", "discrepancies", "noise_sd", "estimand", "stable_in"))
     settings = _settings(SpecimenSettings, values | options)
     shell = _shell("fit", *_files(request), options)
@@ -98,7 +96,7 @@ def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     say("done", {"run": name, "report": f"runs/{name}/report.html"})
 
 
-def laws(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+def laws(request: Mapping[str, Any], say: Say) -> None:
     """Compare laws; say their table, and write the run."""
     from tissuq.report.laws import HEADERS, law_lead, law_result, readable_laws
     from tissuq.report.run_folder import run_folder
@@ -108,7 +106,7 @@ def laws(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     from tissuq.studies.specimen_settings import LawSettings
 
     say("step", "reading")
-    values, found, name = _measured(forms, request)
+    values, found, name = _measured(request)
     options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand"))
     settings = _settings(LawSettings, values | options)
     study = run_laws(settings, Path(), lambda text: say("step", text), found=found)
@@ -132,7 +130,7 @@ def laws(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     )
 
 
-def predict(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+def predict(request: Mapping[str, Any], say: Say) -> None:
     """Predict another loading mode from a run; say the bands, and write the folder."""
     from tissuq.report.prediction import band_headers, prediction_result, readable_bands
     from tissuq.report.run_folder import run_folder
@@ -166,7 +164,7 @@ def predict(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     )
 
 
-def export(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+def export(request: Mapping[str, Any], say: Say) -> None:
     """Write draws of a run as material cards; say the files and what they are."""
     from tissuq.export import CardSettings
     from tissuq.report.cards import write_cards
@@ -200,7 +198,7 @@ def export(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     )
 
 
-TASKS: dict[str, Callable[[ShellForms, Mapping[str, Any], Say], None]] = {
+TASKS: dict[str, Callable[[Mapping[str, Any], Say], None]] = {
     "choices": choices,
     "inspect": inspect,
     "fit": fit,
@@ -211,13 +209,13 @@ TASKS: dict[str, Callable[[ShellForms, Mapping[str, Any], Say], None]] = {
 """Every task by name."""
 
 
-def warm_up(forms: ShellForms) -> None:
+def warm_up() -> None:
     """Do all of a small fit once in the current folder, so that imports and compilation are over when it matters."""
     stretches = [1 + 0.01 * number for number in range(1, 41)]
     stresses = (10 * (x - x**-2) * (1 + 0.5 * (x - 1)) + 0.02 * (-1) ** n for n, x in enumerate(stretches))
     rows = "".join(f"{x},{stress}\n" for x, stress in zip(stretches, stresses, strict=True))
     Path("warm-up.csv").write_text(f"# mode: uniaxial\nstretch,stress [kPa]\n{rows}", encoding="utf-8")
-    fit(forms, {"files": ["warm-up.csv"]}, lambda kind, news: None)
+    fit({"files": ["warm-up.csv"]}, lambda kind, news: None)
 
 
 def _files(request: Mapping[str, Any]) -> tuple[list[str], list[str], dict[str, Any]]:
@@ -231,15 +229,14 @@ def _files(request: Mapping[str, Any]) -> tuple[list[str], list[str], dict[str, 
     return list(request["files"]), modes if any(modes) else [], reading
 
 
-def _measured(forms: ShellForms, request: Mapping[str, Any]) -> tuple[dict[str, Any], Sequence[Any], str]:
+def _measured(request: Mapping[str, Any]) -> tuple[dict[str, Any], Sequence[Any], str]:
     """Return the settings that say what was measured, what was read, and the name of the run."""
     files, modes, reading = _files(request)
     paths = list(map(Path, files))
-    with redirect_stdout(StringIO()):  # it prints what several tests are, which the page shows by itself
-        values, found = forms.measured(paths, reading, modes or None, None, None)
+    values, found = measured(paths, reading, modes or None, None, None)
     values = {name: value for name, value in values.items() if value is not None}
     sources = [Path(test["file"]) for test in values.get("tests") or [values]]
-    return values, found, forms.run_name(paths, None, sources)
+    return values, found, run_name(paths, None, sources)
 
 
 def _options(request: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:

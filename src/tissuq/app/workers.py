@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tissuq.app.shell_forms import ShellForms
 from tissuq.errors import TissuqError
 
 __all__ = ["News", "Workers"]
@@ -34,9 +33,9 @@ class News(NamedTuple):
 class _Process:
     """A process that does one task after another, and its end of the pipe."""
 
-    def __init__(self, forms: ShellForms, scratch: Path, *, is_light: bool) -> None:
+    def __init__(self, scratch: Path, *, is_light: bool) -> None:
         self.connection, other = SPAWNED.Pipe()
-        self.process = SPAWNED.Process(target=_work, args=(other, forms, scratch, is_light), daemon=True)
+        self.process = SPAWNED.Process(target=_work, args=(other, scratch, is_light), daemon=True)
         with _deaf_to_interrupts():
             self.process.start()
         other.close()
@@ -58,10 +57,8 @@ class _Process:
 class _Pool:
     """Processes of one kind: one from the start, further ones when all are busy."""
 
-    def __init__(
-        self, forms: ShellForms, scratch: Path, most: int, threads: ThreadPoolExecutor, *, is_light: bool
-    ) -> None:
-        self.forms, self.scratch, self.most, self.is_light = forms, scratch, most, is_light
+    def __init__(self, scratch: Path, most: int, threads: ThreadPoolExecutor, *, is_light: bool) -> None:
+        self.scratch, self.most, self.is_light = scratch, most, is_light
         self.threads = threads
         self.has_ended = False
         self.idle: asyncio.Queue[_Process] = asyncio.Queue()
@@ -71,7 +68,7 @@ class _Pool:
 
     def start(self) -> None:
         """Start one more process; it is idle as soon as it is prepared."""
-        process = _Process(self.forms, self.scratch, is_light=self.is_light)
+        process = _Process(self.scratch, is_light=self.is_light)
         self.processes.add(process)
         task = asyncio.get_running_loop().create_task(self._prepared(process))
         self.starts.add(task)
@@ -125,18 +122,17 @@ class Workers:
 
     Parameters
     ----------
-    forms : ShellForms
     scratch : Path
         Folder that is deleted after the processes have ended, in which they may leave files.
     fitting : int, optional
         How many fits go on at once; unless given, two where the computer has two cores or more.
     """
 
-    def __init__(self, forms: ShellForms, scratch: Path, fitting: int | None = None) -> None:
+    def __init__(self, scratch: Path, fitting: int | None = None) -> None:
         most = fitting or min(2, os.cpu_count() or 1)
         self._threads = ThreadPoolExecutor(max_workers=most + 2, thread_name_prefix="news")
-        self._light = _Pool(forms, scratch, 1, self._threads, is_light=True)
-        self._heavy = _Pool(forms, scratch, most, self._threads, is_light=False)
+        self._light = _Pool(scratch, 1, self._threads, is_light=True)
+        self._heavy = _Pool(scratch, most, self._threads, is_light=False)
 
     async def start(self) -> None:
         """Start a process of each kind."""
@@ -165,7 +161,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _work(connection: Any, forms: ShellForms, scratch: Path, is_light: bool) -> None:
+def _work(connection: Any, scratch: Path, is_light: bool) -> None:
     """Do tasks until the page ends; every message of tissuq is news, and an error of the program is one, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where systems do not hand it down
     os.chdir(scratch)
@@ -174,7 +170,7 @@ def _work(connection: Any, forms: ShellForms, scratch: Path, is_light: bool) -> 
     if not is_light:
         with tempfile.TemporaryDirectory(prefix="warm-up-", dir=scratch) as folder, suppress(Exception):
             os.chdir(folder)
-            warm_up(forms)
+            warm_up()
             os.chdir(scratch)
     try:
         connection.send((PREPARED, None))
@@ -182,7 +178,7 @@ def _work(connection: Any, forms: ShellForms, scratch: Path, is_light: bool) -> 
             task, request, folder = connection.recv()
             try:
                 os.chdir(folder)
-                TASKS[task](forms, request, lambda kind, data: connection.send((kind, data)))
+                TASKS[task](request, lambda kind, data: connection.send((kind, data)))
             except TissuqError as error:
                 connection.send(("error", {"text": str(error), "code": type(error).__name__}))
             except Exception as error:  # the page goes on, and says what to report

@@ -7,9 +7,9 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from tissuq.cli.answers import Answer, answers_in, options_in, with_options
-from tissuq.cli.reading import find_tests
 from tissuq.errors import InputError, TissuqError
+from tissuq.studies.answers import Answer, answers_in, options_in, with_options
+from tissuq.studies.files_of_tests import find_tests, tables_of, tests_in_words
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -36,7 +36,7 @@ def ask_about(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> 
         When the input ends before all is answered, or a message says of nothing to type that could help.
     """
     settings, settled = dict(reading), set[str]()
-    columns = _columns(file, settings)
+    columns = list(dict.fromkeys(name for table in tables_of(file, settings) for name in table.names))
     while True:
         try:
             tests = find_tests(file, settings, is_only_file=is_only_file)
@@ -54,18 +54,6 @@ def ask_about(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> 
         if not answers:
             continue
         settings = _chosen(file, question, answers, settings, is_only_file=is_only_file, now=tests) or settings
-
-
-def _columns(file: Path, settings: Mapping[str, Any]) -> list[str]:
-    """Return the names of the columns in the tables of a file, or nothing where it cannot be read."""
-    from tissuq.experiments.reading.tables import read_tables
-
-    path = file if file.exists() else Path(str(file).partition("#")[0])
-    try:
-        tables = read_tables(path, settings.get("skip_rows") or 0, settings.get("sheet"), settings.get("table"))
-    except InputError:
-        return []
-    return list(dict.fromkeys(name for table in tables for name in table.names))
 
 
 def _open_questions(tests: Tests) -> list[str]:
@@ -99,7 +87,7 @@ def _chosen(
     )
     listed = (helpful or answers)[:MOST_ANSWERS]
     if now is not None:
-        print(f"  Enter  leave it: {_in_words(now)}")
+        print(f"  Enter  leave it: {tests_in_words(now)}")
     for number, answer in enumerate(listed, start=1):
         print(fill(f"{number}  {answer.text}: {given.get(answer, '')}", WIDTH, initial_indent="  ",
                    subsequent_indent="     "))  # fmt: skip
@@ -124,19 +112,12 @@ def _what_it_gives(
     if answer.asked_for:
         return "a size, to type with its unit"
     try:
-        return _in_words(find_tests(file, with_options(settings, answer), is_only_file=is_only_file))
+        return tests_in_words(find_tests(file, with_options(settings, answer), is_only_file=is_only_file))
     except TissuqError as refusal:
         if str(refusal) == question:
             return ""
         words = str(refusal).removeprefix(f"{file}").lstrip(":, ")
         return f"{REFUSED}: {words[:WIDTH]} ..."
-
-
-def _in_words(tests: Tests) -> str:
-    from tissuq.experiments.reading.inspection import Inspection
-
-    more = f", and {len(tests) - 1} more tests" if len(tests) > 1 else ""
-    return f"{Inspection.of(tests[0][1]).line}{more}"
 
 
 def _with_sizes(answer: Answer) -> Answer:

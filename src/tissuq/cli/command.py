@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
-from dataclasses import dataclass, replace
 from importlib import import_module
 from inspect import Parameter, Signature
 from io import StringIO
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 from typer.core import TyperCommand
 
 from tissuq.cli.call import Call
@@ -20,54 +17,17 @@ from tissuq.cli.former_names import todays_names
 from tissuq.cli.progress import Monitor
 from tissuq.cli.running import Running, Verbosity
 from tissuq.cli.stopping import stopping
-from tissuq.studies.option import Option, Settings, options_of
+from tissuq.studies.option import Settings
 from tissuq.studies.settings import load_settings
+from tissuq.studies.slots import Slot, slots_of, stated
 
-__all__ = ["CONFIGURED", "Command", "Slot", "command", "settings_of", "slots_of", "stated"]
+__all__ = ["CONFIGURED", "Command", "command", "settings_of"]
 
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound=Running)
 
 CONFIGURED: dict[str, tuple[type[Settings], str]] = {}
 """The settings of every command that takes a file of them, by its name, and where the class is that a file is of."""
-
-
-@dataclass(frozen=True)
-class Slot:
-    """A parameter of a command: where its value belongs, and how it is read.
-
-    ``path`` are the names of the setting and of its entry, if any.
-    """
-
-    name: str
-    path: tuple[str, ...]
-    option: Option
-    info: FieldInfo
-    help: str
-    reads: Any
-    is_required: bool = False
-
-    @property
-    def typed(self) -> str:
-        """The parameter as a person types it."""
-        return self.name.upper() if self.option.is_argument else f"--{self.name.replace('_', '-')}"
-
-    def in_group(self, name: str) -> Self:
-        """Return the parameter in a group, unless it is in one."""
-        return replace(self, option=replace(self.option, group=self.option.group or name))
-
-    @property
-    def parameter(self) -> Parameter:
-        """What Typer reads."""
-        if self.option.is_argument:
-            kind: Any = typer.Argument(help=self.help)
-        else:
-            negative = self.option.negative or ("no-" + self.name if self.info.default is True else "")
-            names = "/".join(f"--{name.replace('_', '-')}" for name in (self.name, negative) if name)
-            kind = typer.Option(names, help=self.help, rich_help_panel=self.option.group or None)
-        reads = self.reads if self.is_required else self.reads | None
-        default = Parameter.empty if self.is_required else None
-        return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[reads, kind])
 
 
 def command(
@@ -100,7 +60,7 @@ def command(
 
         run.__doc__, run.__name__ = carry_out.__doc__, carry_out.__name__
         slots = sorted((*of_running, *of_settings), key=lambda slot: not slot.option.is_argument)
-        run.__signature__ = Signature([slot.parameter for slot in slots])  # type: ignore[attr-defined]  # what Typer reads
+        run.__signature__ = Signature(list(map(_parameter, slots)))  # type: ignore[attr-defined]  # what Typer reads
         if has_config:
             CONFIGURED[carry_out.__name__] = settings, whole
         return run
@@ -139,32 +99,14 @@ def settings_of(name: str) -> type[Settings] | None:
     return of_whole_file
 
 
-def slots_of(kind: type[BaseModel], *, is_optional: bool = False) -> Iterator[Slot]:
-    """Give the parameters of a command for some settings; with a configuration file all are optional."""
-    for name, option, info in options_of(kind):
-        if option.help:
-            shown = option.name.replace("-", "_") or name
-            path = (name, option.entry) if option.entry else (name,)
-            is_required = info.is_required() and not is_optional
-            yield Slot(shown, path, option, info, option.explained(info), option.read_as(info), is_required)
-        for entry, text in option.entries.items():
-            yield Slot(entry, (name, entry), Option(text, group=option.group), info, text, str)
-        for slot in slots_of(option.of) if option.of is not None else ():
-            if shown := option.renamed.get(slot.name, slot.name):
-                yield replace(slot, name=shown, path=(name, *slot.path))
-
-
-def stated(slots: Iterable[Slot], values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the settings that are typed, and how each was typed."""
-    settings: dict[str, Any] = {}
-    typed: dict[str, str] = {}
-    for slot in slots:
-        value = values.get(slot.name)
-        if value is None or value == []:
-            continue
-        inner = settings
-        for name in slot.path[:-1]:
-            inner = inner.setdefault(name, {})
-        inner[slot.path[-1]] = slot.option.parse(value) if slot.option.parse else value
-        typed[".".join(slot.path)] = slot.typed
-    return settings, typed
+def _parameter(slot: Slot) -> Parameter:
+    """Return what Typer reads of a parameter."""
+    if slot.option.is_argument:
+        kind: Any = typer.Argument(help=slot.help)
+    else:
+        negative = slot.option.negative or ("no-" + slot.name if slot.info.default is True else "")
+        names = "/".join(f"--{name.replace('_', '-')}" for name in (slot.name, negative) if name)
+        kind = typer.Option(names, help=slot.help, rich_help_panel=slot.option.group or None)
+    reads = slot.reads if slot.is_required else slot.reads | None
+    default = Parameter.empty if slot.is_required else None
+    return Parameter(slot.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[reads, kind])

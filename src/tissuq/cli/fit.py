@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.cli import reading
 from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
 from tissuq.cli.running import Written
 from tissuq.errors import InputError
+from tissuq.studies.files_of_tests import files_of, measured, run_name
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import option
 from tissuq.studies.settings import setting_of
@@ -48,14 +48,14 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     paths: list[Path] = call.stated.pop("file", [])
     if call.config is None and [path.suffix for path in paths] == [".toml"]:
         call, paths = call.with_config(paths[0]), []
-    files = reading.files_of(paths)
+    files = files_of(paths)
     read_as = {name: call.stated.pop(name) for name in ReadingSettings.model_fields if name in call.stated}
     modes, noise = read_as.pop("mode", None), call.stated.pop("noise_sd", None)
     if call.config:
         _check_once(call.how.specimen, modes, noise)
         read_as |= {"mode": modes[0]} if modes else {}
     of_files = [] if call.config else files
-    measured, found = reading.measured(of_files, read_as, modes, call.how.specimen, noise)
+    of_tests, found = measured(of_files, read_as, modes, call.how.specimen, noise, print)
     if not (paths or call.config):
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     if call.config and len(files) > 1:
@@ -67,7 +67,7 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     chosen = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
     laws_of_names = {name: material_named(name, laws=True) for name in names if name != ALL}
     kind = LawSettings if is_comparison else SpecimenSettings
-    settings = call.loaded_as(kind, ("noise", "noise_sd"), **measured, **chosen)
+    settings = call.loaded_as(kind, ("noise", "noise_sd"), **of_tests, **chosen)
     sources = [call.beside / test.file for test in settings.tests or (settings,)]
     if files and call.config:
         _check_same(files[0], sources[0], call.config)
@@ -75,7 +75,7 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     priors_in_mpa(
         settings, settings.fitted_laws(laws_of_names).values(), Experiment.of([of.experiment for of in readings])
     )
-    target = call.target(Path("runs") / reading.run_name(paths, call.config, sources))
+    target = call.target(Path("runs") / run_name(paths, call.config, sources))
     if isinstance(settings, LawSettings):
         _compare_laws(call, settings, laws_of_names, readings, sources, target)
     else:

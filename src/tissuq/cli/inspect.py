@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from tissuq.cli.ask import ask_about
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.reading import files_of, find_tests
 from tissuq.cli.running import Running
 from tissuq.errors import InputError
+from tissuq.studies.files_of_tests import files_of, find_tests
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import argument, option
 

@@ -18,12 +18,8 @@ def app(
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> None:
     """Open a page in the browser for files of measurements: read, mend, fit, compare, predict, export."""
-    from tissuq.app.shell_forms import ShellForms
-    from tissuq.cli.answers import answers_in, with_options
-    from tissuq.cli.reading import find_tests, measured, run_name
-
     try:
         from tissuq.app.server import serve
     except ModuleNotFoundError as missing:
         raise InputError(f"the page needs {missing.name}: pip install 'tissuq[app]'.") from missing
-    serve(ShellForms(measured, find_tests, answers_in, with_options, run_name), port, open_browser=browser)
+    serve(port, open_browser=browser)

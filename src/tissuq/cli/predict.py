@@ -7,9 +7,9 @@ from pathlib import Path
 
 from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
-from tissuq.cli.reading import resolve
 from tissuq.cli.running import OfRun
 from tissuq.errors import InputError
+from tissuq.studies.files_of_tests import resolve
 from tissuq.studies.option import option
 from tissuq.studies.prediction_settings import PredictionSettings
 

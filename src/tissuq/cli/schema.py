@@ -6,10 +6,11 @@ import json
 from typing import Any
 
 from tissuq.cli.call import Call
-from tissuq.cli.command import CONFIGURED, command, settings_of, slots_of
+from tissuq.cli.command import CONFIGURED, command, settings_of
 from tissuq.cli.running import Running
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument
+from tissuq.studies.slots import slots_of
 
 __all__ = ["schema", "schema_of"]
 

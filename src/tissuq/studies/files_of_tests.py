@@ -1,8 +1,8 @@
-"""Files of measurements on the command line: tests in them, modes, specimens and noise."""
+"""Files of measurements that are named with their options: tests in them, modes, specimens and noise."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,9 @@ from tissuq.studies.settings import load_settings
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.reading.table import Table
 
-__all__ = ["files_of", "find_tests", "measured", "resolve", "run_name"]
+__all__ = ["files_of", "find_tests", "measured", "resolve", "run_name", "tables_of", "tests_in_words"]
 
 OPTIONAL_FOR_TESTS = ("dimensions", "compression_positive")
 """Options that a test does without where another one needs them: an error where none does."""
@@ -52,10 +53,12 @@ def measured(
     modes: Sequence[str] | None,
     specimens: Sequence[str] | None,
     noise: Sequence[float | str] | None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> tuple[dict[str, Any], list[Reading | None]]:
     """Return the settings of a fit that say what was measured: of the only test, or of each of several.
 
-    And what has been read of every test; None where it is to be read in another mode than it was found in.
+    And what has been read of every test; None where it is to be read in another mode than it was found in. ``say`` is
+    told which tests files of several hold.
 
     Raises
     ------
@@ -81,7 +84,7 @@ def measured(
                 raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
         return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(found)
     if len(tests) > len(files):
-        print(*lines_of_tests(list(map(Inspection.of, found))), "", sep="\n")
+        say("\n".join([*lines_of_tests(list(map(Inspection.of, found))), ""]))
     stated_noise = noise if noise and len(noise) > 1 else None
     for name, option, values in (
         ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)
@@ -135,6 +138,25 @@ def find_tests(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) ->
             of_test["name"] = test.name if is_only_file else f"{Path(path).stem} {test.name}"
         settings.append(({key: value for key, value in of_test.items() if value is not None}, test.reading))
     return settings
+
+
+def tests_in_words(tests: Sequence[tuple[Mapping[str, Any], Reading]]) -> str:
+    """Return what the first of some tests is, and how many more there are."""
+    from tissuq.experiments.reading.inspection import Inspection
+
+    more = f", and {len(tests) - 1} more tests" if len(tests) > 1 else ""
+    return f"{Inspection.of(tests[0][1]).line}{more}"
+
+
+def tables_of(file: Path, reading: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of a file, or of the one that ``FILE#NAME`` names; nothing where none can be read."""
+    from tissuq.experiments.reading.tables import read_tables
+
+    path = file if file.exists() else Path(str(file).partition("#")[0])
+    try:
+        return list(read_tables(path, reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")))
+    except InputError:
+        return []
 
 
 def run_name(paths: Sequence[Path], config: Path | None, sources: Sequence[Path]) -> str:

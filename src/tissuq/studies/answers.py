@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tissuq.cli.command import slots_of, stated
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import ReadingSettings
+from tissuq.studies.slots import slots_of, stated
 
 __all__ = ["Answer", "answers_in", "options_in", "with_options"]
 
