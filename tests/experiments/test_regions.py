@@ -203,3 +203,15 @@ def test_a_fall_on_the_way_from_compression_to_the_reference_is_no_slip(inspecte
 
 def test_two_loads_alone_are_no_saturation():
     assert not len(find_saturation(np.repeat([0.17, 0.40], 11)))
+
+
+def test_the_last_rows_of_protocols_that_begin_anew_are_no_outliers(inspected):
+    way = np.linspace(0, 1, 16)
+    stretch = np.concatenate([1 + end * way for end in (0.2, 0.15, 0.15)])
+    stress = 5 * np.expm1(14 * (stretch - 1))
+    assert not any("far off" in text for text in inspected(stretch, stress).warnings)
+    stress[8] += 25.0
+    assert any(
+        "a row lies far off the ones before and after, in line 10" in text
+        for text in inspected(stretch, stress).warnings
+    )

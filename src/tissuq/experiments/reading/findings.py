@@ -11,6 +11,7 @@ from numpy.polynomial import Polynomial
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
+from tissuq.experiments.reading.load_cell import scatter_of_neighbours
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
@@ -29,6 +30,8 @@ NOTABLE_SHARE = 0.05
 """Share of the largest stress, or of the range of stretches, that is worth a word."""
 ROWS_OF_LINE = 3
 """Measurements next to the reference, at the least, through which a line says the stress there."""
+ERRORS_OF_ZERO = 3.0
+"""Standard errors of the stress there, by which it must differ from zero."""
 NEGLIGIBLE_STRESS = 0.01
 """Share of the largest stress that is none."""
 PLAUSIBLE_STRESS = (1e-6, 1e3)
@@ -133,26 +136,29 @@ def _reference(reading: Reading, number: int) -> str:
             return ""  # between measurements, which says neither where the test begins nor what its zero is
         return f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
     at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
-    stresses = [at_reference]
+    at_rest, standard_error = at_reference, scatter_of_neighbours(stress)
     if points.ndim == 1 and gap > 0:  # what a line through the measurements next to the reference has there
         rows = change <= max(ROWS_OF_LINE * gap, np.sort(change)[min(ROWS_OF_LINE, len(change)) - 1])
-        stresses.append(float(Polynomial.fit(points[rows] - mode.reference, stress[rows], 1)(0.0)))
-    if min(np.sign(at_reference) * np.array(stresses)) <= NOTABLE_SHARE * largest:
+        away = points[rows] - mode.reference
+        at_rest = float(Polynomial.fit(away, stress[rows], 1)(0.0))
+        standard_error *= np.sqrt(1 / len(away) + away.mean() ** 2 / ((away - away.mean()) ** 2).sum())
+    sign = np.sign(at_reference)
+    if min(sign * at_reference, sign * at_rest) <= max(NOTABLE_SHARE * largest, ERRORS_OF_ZERO * standard_error):
         return ""
+    zero = _load_zero(reading, number, nearest, at_rest / at_reference)
     return (
         f"at {control.name} {stretch[nearest]:.4g} {STRESS_AT_REST} {at_reference / unit.to_mpa:.3g} {unit.name}, "
         f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which --load-zero "
-        f"{_load_zero(reading, number, nearest)} takes off. A hyperelastic material has no stress at {control.name} "
-        f"{control.reference:g}."
+        f"{zero} takes off. A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
 
 
-def _load_zero(reading: Reading, number: int, row: int) -> str:
-    """Return what takes off the load in a row, as the file has it."""
+def _load_zero(reading: Reading, number: int, row: int, share: float) -> str:
+    """Return what takes off a share of the load in a row, as the file has it."""
     table, column = reading.used.table, reading.choices[number].stress
     (values,) = table.taken(np.array([row])).numbers([column])
     unit = table.unit(column)
-    return f'"{values[0]:.4g} {unit}"' if unit and reading.used.rows[row] else "first"
+    return f'"{share * values[0]:.4g} {unit}"' if unit and reading.used.rows[row] else "first"
 
 
 def _diameter(reading: Reading, number: int) -> str:

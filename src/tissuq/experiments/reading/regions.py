@@ -27,6 +27,8 @@ COARSE_STEP = 0.007
 """Share of the largest load from which its step is worth a word: its error is then that of a careful laboratory."""
 FEWEST_COPIED_ROWS = 5
 """Rows after one another that measure, to the last digit, what others after one another did."""
+RESTART = 0.5
+"""Share of a cycle's range from which the step to the next one is no unloading: the test begins anew."""
 UNIFORM_SD = 12**-0.5
 """Standard deviation of an error that is even over a step."""
 
@@ -77,8 +79,15 @@ class TestedStress:
 
     @cached_property
     def outliers(self) -> NDArray[np.intp]:
-        """Single rows far from their neighbours, in stress or course."""
-        return np.union1d(find_outliers(self.stress), find_outliers(self.course))
+        """Single rows far from their neighbours, in stress or course; not those at which a test begins anew."""
+        outliers = np.union1d(find_outliers(self.stress), find_outliers(self.course))
+        restarts = [
+            cycle.stop
+            for cycle in self.cycles[:-1]
+            if abs(np.diff(self.course[cycle.stop - 1 : cycle.stop + 1]).sum())
+            > RESTART * np.ptp(self.course[cycle.start : cycle.stop])
+        ]
+        return np.setdiff1d(outliers, [row for stop in restarts for row in (stop - 1, stop)])
 
     @cached_property
     def rupture(self) -> Event | None:

@@ -50,7 +50,7 @@ ROLES = {
     ),
     "strain": names_of(
         "strain, engineering strain, nominal strain, tensile strain, nominelle dehnung, gerinim, birim uzama, "
-        "compressive strain, dehnung, stauchung, eps, "
+        "compressive strain, dehnung, nenndehnung, stauchung, eps, "
         "epsilon, ε, déformation, deformación, deformação, deformazione, rek, töjning, tøyning, 应变, 應變, ひずみ, "
         "歪み, 歪, 변형률, деформация, деформация растяжения, деформация сжатия, осевая деформация, "
         "продольная деформация, "
@@ -111,7 +111,7 @@ ROLES = {
     ),
     "stress": names_of(
         "stress, wall stress, tensile stress, compressive stress, shear stress, gerilme, "
-        "spannung, zugspannung, druckspannung, schubspannung, "
+        "spannung, zugspannung, druckspannung, schubspannung, nennspannung, nominelle spannung, "
         "contrainte, tensión, esfuerzo, tensão, tensione, sforzo, spanning, spänning, 应力, 應力, 応力, 응력, "
         "напряжение, осевое напряжение, напряжение растяжения, растягивающее напряжение, напряжение сжатия, "
         "сжимающее напряжение, напряжение сдвига, касательное напряжение, 拉应力, 拉伸应力, 压应力, 剪切应力, 剪应力, "
