@@ -253,7 +253,7 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     assert any("emulator's error is large beside the noise" in text for text in poor.warnings)
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)
     found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 1.18)}, noise_sd=0.02, runs=6)
-    assert any("reaches the end of the simulated range of C10 (upper)" in text for text in found.warnings)
+    assert any("reaches the bound of the prior of C10 (upper)" in text for text in found.warnings)
 
 
 @pytest.mark.slow
@@ -368,3 +368,11 @@ def test_scores_of_heavy_tails_are_finite_parameters(prior):
     assert np.isfinite(values).all()
     assert (np.diff(values) >= 0).all()
     assert values[2] == pytest.approx(prior.quantile(0.5))
+
+
+@pytest.mark.slow
+def test_a_posterior_beyond_all_runs_is_told_as_such_and_not_as_the_bound_of_a_prior():
+    data = measured(neo_hooke, {"C10": 1.2}, 0.02)
+    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.LogNormal(2.0, 0.05)}, noise_sd=0.02, runs=6)
+    assert any("lies beyond the runs of the model in C10 (lower)" in text for text in found.warnings)
+    assert not any("bound of the prior" in text for text in found.warnings)

@@ -135,7 +135,9 @@ class Calibration:
         from tissuq.emulation.sampling import sample_posterior
 
         exact = Likelihood(self.problem, self.emulator, has_error=False)
-        calibration = replace(self, posterior=sample_posterior(exact, self.seed, self.method))
+        # Of a comparison the effective points need not be many.
+        method = "importance" if self.posterior.method == "importance" else self.method
+        calibration = replace(self, posterior=sample_posterior(exact, self.seed, method))
         calibration.__dict__["likelihood"] = exact
         return calibration
 

@@ -177,7 +177,7 @@ class DeckForward(Forward):
         extra_files(self.read_deck, self.also, Path())
         for quantity in self.quantities:
             quantity.check()
-        check_sets(self.read_deck, self.quantities)
+        check_sets(self.read_deck, self.quantities, self.program)
         sets_of(self.read_deck, self.quantities)
         if not all(np.isfinite(factor) and factor for factor in (*self.factors.values(), self.along_factor)):
             raise InputError("a factor of a quantity must be a number other than zero.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import get_args
@@ -21,8 +21,8 @@ __all__ = ["SampledPosterior", "sample_posterior"]
 
 FloatArray = NDArray[np.float64]
 
-SEARCH_POINTS, ROUND_POINTS, MAX_ROUNDS = 512, 1024, 8
-"""Points of a search round; points of a sampling round, and the number of sampling rounds."""
+SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 8, 32
+"""Points of a search round; points of a sampling round, the number of these, and where it does not suffice, at most."""
 COMPONENTS, FITTED_POINTS, FIT_STEPS = 4, 1024, 12
 """Gaussians of a proposal, points to which they are fitted, and the steps of the fit."""
 MIN_EFFECTIVE_POINTS = 800
@@ -112,7 +112,7 @@ def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
     mean_weight = float(weights.mean())
     weights /= weights.sum()
     count, effective_points, heaviest = len(logs), effective(logs), float(weights.max())
-    converged = effective_points > MIN_EFFECTIVE_POINTS and heaviest < MAX_POINT_WEIGHT
+    converged = _suffice(logs)
     verdict = (
         f"{'Converged' if converged else 'Not converged'}: {effective_points:.0f} of {count} weighted points are "
         f"effective (at least {MIN_EFFECTIVE_POINTS}); the heaviest has {heaviest:.2g} of the weight (less than "
@@ -149,23 +149,39 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
     searched = [
         adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal for candidate in (exact, likelihood)
     ]
-    cube = qmc.Sobol(size, rng=np.random.default_rng([seed, 43])).random(ROUND_POINTS * MAX_ROUNDS)
+    sequence = qmc.Sobol(size, rng=np.random.default_rng([seed, 43]))
     proposals: list[tuple[float, Proposal]] = []
-    scores, targets, logs = np.zeros((0, size)), np.zeros(0), np.zeros(0)
-    for number, uniforms in enumerate(np.split(np.clip(cube, 1e-12, 1 - 1e-12), MAX_ROUNDS)):
+    scores, targets, logs, mixture = np.zeros((0, size)), np.zeros(0), np.zeros(0), np.zeros(0)
+    for number in range(MAX_ROUNDS):
+        if number >= ROUNDS and _suffice(logs):
+            break
+        uniforms = np.clip(sequence.random(ROUND_POINTS), 1e-12, 1 - 1e-12)
         of_round = [(1.0, searched[number])] if number < len(searched) else _components(scores, logs)
         ends = np.round(np.cumsum([share for share, _ in of_round]) * ROUND_POINTS).astype(int)
         blocks = np.split(uniforms, ends[:-1])
         new = np.concatenate([part.points(block) for (_, part), block in zip(of_round, blocks, strict=True)])
-        proposals += [
+        more = [
             (len(block) / ROUND_POINTS, part) for (_, part), block in zip(of_round, blocks, strict=True) if len(block)
         ]
+        proposals += more
+        mixture = np.concatenate([np.logaddexp(mixture, _log_mixture(more, scores)), _log_mixture(proposals, new)])
         scores, targets = np.concatenate([scores, new]), np.concatenate([targets, _log_target(likelihood, new)])
         if not np.isfinite(targets).any():
             raise ConvergenceError("the measurements have no probability at any parameters that the priors allow.")
-        mixture = np.logaddexp.reduce([np.log(share) + part.log_density(scores) for share, part in proposals], axis=0)
         logs = targets - mixture + np.log(number + 1)
     return scores, logs
+
+
+def _log_mixture(proposals: Sequence[tuple[float, Proposal]], scores: FloatArray) -> FloatArray:
+    """Return the logarithm (N,) of the sum of proposals, times their shares, at scores (N, D)."""
+    heights = [np.log(share) + part.log_density(scores) for share, part in proposals]
+    return np.asarray(np.logaddexp.reduce(heights, axis=0))
+
+
+def _suffice(logs: FloatArray) -> bool:
+    """Return whether points with these log weights (N,) represent a posterior."""
+    heaviest = np.exp(logs.max() - np.logaddexp.reduce(logs))
+    return bool(effective(logs) > MIN_EFFECTIVE_POINTS and heaviest < MAX_POINT_WEIGHT)
 
 
 def _log_target(likelihood: Likelihood, scores: FloatArray) -> FloatArray:

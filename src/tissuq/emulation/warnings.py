@@ -88,11 +88,19 @@ def calibration_warnings(
         )
         yield f"{emulator.runs.failure_summary} {position}"
     yield from _emulator_warnings(problem, check, posterior, exact, emulator_share)
-    ends = [f"{symbol} ({end})" for symbol, end in _at_edge(problem, emulator, posterior)]
-    if ends:
+    at_bounds, beyond_runs = (
+        [f"{symbol} ({end})" for symbol, end in ends] for ends in _at_ends(problem, emulator, posterior)
+    )
+    if beyond_runs:
         yield (
-            f"the posterior reaches the end of the simulated range of {', '.join(ends)}: there the prior, not the "
-            "data, decides. Give a wider prior, unless the bound is intended."
+            f"the posterior lies beyond the runs of the model in {', '.join(beyond_runs)}, which lie where its prior "
+            "is: the emulator extrapolates, or the prior contradicts the measurements. Let runs be placed where the "
+            "posterior is (refine)."
+        )
+    if at_bounds:
+        yield (
+            f"the posterior reaches the bound of the prior of {', '.join(at_bounds)}: there the prior, not the data, "
+            "decides. Give a wider prior, unless the bound is intended."
         )
     yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
 
@@ -170,14 +178,18 @@ def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> flo
     return float(runs.failed[nearest].mean())
 
 
-def _at_edge(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> Iterator[tuple[str, str]]:
-    """Yield the forward parameters with posterior at an end of the run plan, and which end."""
+def _at_ends(
+    problem: Problem, emulator: Emulator, posterior: SampledPosterior
+) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Return where the posterior is at bounds of priors, and where it is beyond all runs: parameters and which end."""
+    at_bounds, beyond_runs = [], []
     for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
-        low, high = problem.priors[symbol].support
-        low, high = max(low, column.min()), min(high, column.max())
-        values = posterior.values[:, problem.symbols.index(symbol)]
-        edge = EDGE_WIDTH * (high - low)
-        if posterior.weights[values < low + edge].sum() > MAX_EDGE_PROBABILITY:
-            yield symbol, "lower"
-        if posterior.weights[values > high - edge].sum() > MAX_EDGE_PROBABILITY:
-            yield symbol, "upper"
+        bounds, values = problem.priors[symbol].support, posterior.values[:, problem.symbols.index(symbol)]
+        run_ends, signs = (float(column.min()), float(column.max())), (1.0, -1.0)
+        edge = EDGE_WIDTH * (run_ends[1] - run_ends[0])
+        for end, bound, run_end, sign in zip(("lower", "upper"), bounds, run_ends, signs, strict=True):
+            if posterior.weights[sign * (values - bound) < edge].sum() > MAX_EDGE_PROBABILITY:
+                at_bounds.append((symbol, end))
+            elif posterior.weights[sign * (values - run_end) < 0].sum() > MAX_EDGE_PROBABILITY:
+                beyond_runs.append((symbol, end))
+    return at_bounds, beyond_runs

@@ -364,6 +364,11 @@ def _lead(study: CalibrationStudy) -> str:
     share = max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols)
     whose = "" if study.settings.material else ", in the units of the forward model"
     size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
+    if share > LARGE_SHARE:
+        return (
+            f"Not to be used yet: the error of the emulator contributes {size} to the variance. With it, "
+            f"{', and '.join(findings)}{whose}, with a probability of 95 % each."
+        )
     return (
         f"With a probability of 95 % each, {', and '.join(findings)}{whose}. The error of the "
         f"emulator contributes {size} to their variance."

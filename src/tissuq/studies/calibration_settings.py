@@ -286,6 +286,8 @@ class CalibrationSettings(ModelSettings):
         from tissuq.decks.quantity import located
         from tissuq.emulation import DeckForward
         from tissuq.emulation.deck_units import conversion
+        from tissuq.errors import InputError
+        from tissuq.experiments.units import LENGTH
 
         cards = self.card_settings()
         texts = {key: self.quantities[key] if key else next(iter(self.quantities.values())) for key in of_model.names}
@@ -297,6 +299,12 @@ class CalibrationSettings(ModelSettings):
         }
         is_one, control_unit = len(quantities) == 1, units.get(of_model.names[0], ("", ""))[0]
         controlled, along = of_model.controlled, self.along.get(of_model.controlled)
+        if along is None and LENGTH.factor_or_none(control_unit):
+            raise InputError(
+                f"the controls of the file are lengths ({control_unit}), and would be compared with the time of the "
+                "model: say which displacement of it they are, as in --along depth=U3@SET; where the time itself is "
+                "meant, leave the unit out of the heading."
+            )
         return DeckForward(
             model,
             replaced,
