@@ -173,3 +173,9 @@ def with_column(name, values):
 def test_covariates_that_cannot_be_used_are_refused_in_one_message(given, words):
     with pytest.raises(tq.InputError, match=words):
         covariates_of(given, NAMES)
+
+
+def test_levels_that_differ_in_capitals_only_are_refused():
+    sexes = {name: {"sex": sex} for name, sex in zip(NAMES, ("f", "m", "F", "m", "f", "f"), strict=True)}
+    with pytest.raises(tq.InputError, match="'F' and 'f' differ in capitals only"):
+        covariates_of(sexes, NAMES)

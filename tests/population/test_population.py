@@ -370,7 +370,7 @@ def test_few_specimens_are_warned_about(found):
     [
         (lambda s: dict(list(s.items())[:2]), {}, "needs 3 specimens or more; there are 2 \\(s0, s1\\)"),
         (lambda s: list(s.values()), {}, "there are 1 \\(synthetic neo-hookean\\)"),
-        (lambda s: [list(s.values())], {}, "experiment number 1 is no tissuq.Experiment"),
+        (lambda s: [7, *s.values()], {}, "measurements are needed: a file"),
         (lambda s: s | {"empty": []}, {}, "there is no experiment to fit"),
         (lambda s: s, {"parameters": ["C01"]}, "must be a list of C10; found: C01"),
         (lambda s: s, {"parameters": "C10"}, "must be a list of C10"),
@@ -398,3 +398,23 @@ def test_a_new_patient_is_a_posterior_that_is_saved_predicts_and_becomes_materia
     assert loaded.warnings == patient.warnings
     assert loaded.summary().equals(patient.summary())
     assert "log_likelihood" not in loaded.data.children  # of other specimens' measurements
+
+
+def test_copies_and_a_specimen_in_another_unit_are_told():
+    specimens = specimens_of(MODULI)
+    first, second, third, *_ = specimens
+    copied = tq.Experiment("uniaxial", STRETCH, specimens[first].stress)
+    thousandth = tq.Experiment("uniaxial", STRETCH, specimens[third].stress / 1000)
+    warnings = neo_hookean(specimens | {second: copied, third: thousandth}).warnings
+    assert any(f"the measurements of {first} and {second} are equal to the last digit" in text for text in warnings)
+    assert any(f"the modulus of {third} is 0.0" in text and "unit" in text for text in warnings)
+    assert not any("equal" in text or "unit" in text for text in neo_hookean(specimens).warnings)
+
+
+def test_tables_stand_for_the_tests_of_specimens():
+    tables = {
+        name: {"stretch": STRETCH, "stress [MPa]": experiment.stress}
+        for name, experiment in specimens_of(MODULI).items()
+    }
+    pairs = zip(neo_hookean(tables).median.ravel(), neo_hookean(specimens_of(MODULI)).median.ravel(), strict=True)
+    assert all(abs(of_table / of_experiment - 1) < 1e-6 for of_table, of_experiment in pairs)

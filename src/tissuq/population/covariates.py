@@ -270,6 +270,11 @@ def _covariate(name: str, values: Mapping[str, Any], place: Place) -> Covariate:
     levels = sorted(set(words), key=lambda word: (-words.count(word), word))
     if len(levels) == 1:
         raise InputError(f"{place('', name)}: all specimens have the same value, '{levels[0]}': leave it out.")
+    alike = {level.casefold(): level for level in reversed(levels)}
+    if different := [level for level in levels if alike[level.casefold()] != level]:
+        first, other = alike[different[0].casefold()], different[0]
+        specimen = next(specimen for specimen, value in values.items() if str(value).strip() == other)
+        raise InputError(f"{place(specimen, name)}: '{other}' and '{first}' differ in capitals only: write them alike.")
     return LevelCovariate(name, tuple(levels))
 
 

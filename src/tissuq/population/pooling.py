@@ -11,6 +11,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, NoDiscrepancy, discrepancy_named
 from tissuq.model.noise import Noise
@@ -33,7 +34,7 @@ ALL_SPECIMENS = "all specimens"
 
 
 def fit_population(
-    experiments: Sequence[Experiment] | Mapping[str, Experiment | Sequence[Experiment]],
+    experiments: Sequence[Any] | Mapping[str, Any],
     *,
     parameters: Sequence[str] | None = None,
     spread: float = 1.0,
@@ -58,9 +59,10 @@ def fit_population(
     Parameters
     ----------
     experiments : sequence of Experiment, or mapping of str to Experiment or sequence of them
-        The tests of every specimen, in any loading modes. In a sequence, experiments of the same specimen (of the same
-        name, where no specimen is given) belong together. A specimen's tests in one mode are joined, so that they
-        can determine the noise (``noise="repeats"``); those in several modes are fitted together.
+        The tests of every specimen, in any loading modes; files and tables stand for what `tissuq.read` makes of them.
+        In a sequence, experiments of the same specimen (of the same name, where no specimen is given) belong together.
+        A specimen's tests in one mode are joined, so that they can determine the noise (``noise="repeats"``); those in
+        several modes are fitted together.
     parameters : sequence of str, optional
         The material's parameters that are pooled; all, unless given. The others stay each specimen's own.
     spread : float
@@ -164,14 +166,14 @@ def fit_population(
 
 
 def _by_specimen(
-    experiments: Sequence[Experiment] | Mapping[str, Experiment | Sequence[Experiment]],
+    experiments: Sequence[Any] | Mapping[str, Any],
 ) -> dict[str, list[Experiment]]:
     """Return the tests of each specimen."""
     tests_of: dict[str, list[Experiment]] = {}
     if isinstance(experiments, Mapping):
-        tests_of = {str(name): list(Experiment.of(tests).tests) for name, tests in experiments.items()}
+        tests_of = {str(name): list(measurements(tests).tests) for name, tests in experiments.items()}
     elif experiments:
-        for test in Experiment.of(experiments).tests:
+        for test in measurements(experiments).tests:
             tests_of.setdefault(test.specimen or test.name, []).append(test)
     if len(tests_of) < MIN_SPECIMENS:
         names = f" ({', '.join(tests_of)})" if tests_of else ""

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from statistics import median
+
 from tissuq.population.draws import PopulationDraws
 
 __all__ = ["MIN_EFFECTIVE_SHARE", "warnings_of"]
 
 MIN_EFFECTIVE_SHARE = 0.5
 """Smallest share of draws that must remain effective when they are corrected."""
+FAR_FACTOR = 50.0
+"""Between the modulus of a specimen and that of the others, from which its unit may be wrong."""
 MIN_SPECIMENS_FOR_SPREAD = 5
 """Smallest number of specimens for which the prior of the spread has little influence."""
 
 
 def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
     """Return the warnings, in sentences."""
-    sentences = []
+    sentences = [*_equal_specimens(population), *_far_specimens(population)]
     if not population.hierarchy.diagnostics.converged:
         sentences.append(population.hierarchy.diagnostics.verdict)
     if population.hierarchy.effective <= MIN_EFFECTIVE_SHARE:
@@ -39,3 +44,28 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
             f"the new patient is beyond the specimens: {', '.join(beyond)}. That effects go on so is assumed."
         )
     return tuple(sentences)
+
+
+def _equal_specimens(population: PopulationDraws) -> Iterator[str]:
+    """Yield a warning about specimens with the same measurements: files or rows that were copied."""
+    of_measurements: dict[bytes, list[str]] = {}
+    for name, posterior in population.posteriors.items():
+        of_measurements.setdefault(posterior.model.experiment.measured.tobytes(), []).append(name)
+    copies = [" and ".join(names) for names in of_measurements.values() if len(names) > 1]
+    if copies:
+        yield (
+            f"the measurements of {'; of '.join(copies)} are equal to the last digit, as copies are: keep one of "
+            "them, for copies make the spread between specimens smaller than it is."
+        )
+
+
+def _far_specimens(population: PopulationDraws) -> Iterator[str]:
+    """Yield a warning about specimens whose stiffness is that of others in another unit."""
+    moduli = {name: posterior.initial_shear_modulus.mean for name, posterior in population.posteriors.items()}
+    middle = median([modulus for modulus in moduli.values() if modulus > 0] or [0.0])
+    for name, modulus in moduli.items():
+        if modulus > 0 and not 1 / FAR_FACTOR < modulus / middle < FAR_FACTOR:
+            yield (
+                f"the modulus of {name} is {modulus / middle:.2g} times that of the other specimens: see whether the "
+                "unit of its stresses, or its area, is right."
+            )

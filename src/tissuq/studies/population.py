@@ -53,7 +53,7 @@ class PopulationStudy:
     @property
     def warnings(self) -> list[str]:
         """Warnings about data and fit."""
-        return [*self.data_warnings, *self.population.warnings]
+        return [*self.population.warnings, *self.data_warnings]
 
 
 def run_population(
