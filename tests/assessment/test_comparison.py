@@ -10,6 +10,7 @@ from scipy.stats import norm
 import gallery
 import tissuq as tq
 from tissuq.prediction.moments import stress_moments
+from tissuq.report.comparison import comparison_warnings
 
 STRETCH = np.linspace(0.7, 1.9, 14)
 DATA = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, STRETCH, noise_sd=0.05, seed=1)
@@ -89,7 +90,7 @@ def test_saved_posteriors_compare_like_those_in_memory(fits, tmp_path):
     first, second = tq.compare(trees), tq.compare({name: fits[name] for name in trees})
     assert list(first["parameter"]) == list(second["parameter"]) == ["C10", "C10"]
     refitted = ["evidence_change_quarter", "evidence_change_fourfold", "log_bayes_factor_low", "log_bayes_factor_high"]
-    numbers = second.columns.drop(["is_rough", "parameter"])
+    numbers = second.columns.drop(["is_rough", "parameter", "intervals_of"])
     np.testing.assert_allclose(first[numbers.drop(refitted)], second[numbers.drop(refitted)], rtol=1e-10)
     assert first.loc["yeoh", refitted].isna().all()  # a file holds no other fits
     assert (first.loc["none", refitted[:2]] == 0).all()  # has nothing to scale
@@ -106,3 +107,15 @@ def test_fits_of_other_data_and_single_fits_are_refused(fits):
         tq.compare({"none": fits["none"], "planar": planar})
     with pytest.raises(tq.InputError, match="not a posterior of tissuq"):
         tq.compare({"none": fits["none"], "foreign": xr.DataTree()})
+
+
+def test_fits_of_different_materials_are_compared_by_their_initial_shear_modulus(fits):
+    mooney = tq.fit(DATA, material="mooney-rivlin", discrepancy="none", noise_sd=0.05, tolerances="tissue")
+    table = tq.compare({"none": fits["none"], "mooney": mooney})
+    assert set(table["parameter"]) == {"initial shear modulus"}
+    stiffness = mooney.initial_shear_modulus
+    wanted = [float(stiffness.quantile(0.5)), *stiffness.hdi()]
+    np.testing.assert_allclose(table.loc["mooney", ["median", "hdi_low", "hdi_high"]].to_numpy(float), wanted)
+    assert table.loc["none", "median"] == pytest.approx(2 * fits["none"].marginals["C10"].quantile(0.5), rel=1e-6)
+    (warning,) = (text for text in comparison_warnings(table) if "different things" in text)
+    assert "of none they are of this specimen as tested" in warning

@@ -192,6 +192,7 @@ FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-12
 """Relative difference of the same measurements in two units."""
+INITIAL_SHEAR_MODULUS = "initial shear modulus"
 EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
 
@@ -222,7 +223,9 @@ def compare(fits: Mapping[str, Any], unit: str = "MPa") -> pd.DataFrame:
           at given nonlinear parameters, whose posterior without it follows by importance weights
           (`tissuq.prediction.densities`). is_rough marks fits in which too few of these weights are effective.
         - stacking: weights for an average of *predictions*, not of parameters.
-        - parameter, median, hdi_low, hdi_high: the material's first parameter and its 95 % interval, in the unit.
+        - parameter, median, hdi_low, hdi_high: the material's first parameter and its 95 % interval, in the unit; the
+          initial shear modulus where materials differ, as their parameters mean different things.
+        - intervals_of: what the interval is of.
 
     Raises
     ------
@@ -261,8 +264,8 @@ def compare(fits: Mapping[str, Any], unit: str = "MPa") -> pd.DataFrame:
             "probability": np.exp(factor) / np.nansum(np.exp(factor)),
             **changes,
             **_by_leave_one_out(trees),
-            "parameter": [tree.attrs.get("headline", "") for tree in trees.values()],
-            **{name: _numbers(trees, f"headline_{name}") for name in ("median", "hdi_low", "hdi_high")},
+            **_parameter(trees),
+            "intervals_of": [tree.attrs.get("intervals_of", "") for tree in trees.values()],
         },
         list(trees),
     )
@@ -285,6 +288,16 @@ def _tree(fit: Any) -> xr.DataTree:
 def _numbers(trees: Mapping[str, xr.DataTree], name: str) -> FloatArray:
     """Return a number that the fits' attributes give; nan where they do not."""
     return np.array([float(tree.attrs.get(name, np.nan)) for tree in trees.values()])
+
+
+def _parameter(trees: Mapping[str, xr.DataTree]) -> dict[str, Any]:
+    """Return the first parameter of the material of all fits, or their initial shear modulus where materials differ."""
+    is_one_material = len({tree.attrs.get("material") for tree in trees.values()}) == 1
+    names = [tree.attrs.get("headline", "") if is_one_material else INITIAL_SHEAR_MODULUS for tree in trees.values()]
+    label = "headline" if is_one_material else "modulus"
+    return {"parameter": names} | {
+        name: _numbers(trees, f"{label}_{name}") for name in ("median", "hdi_low", "hdi_high")
+    }
 
 
 def _by_leave_one_out(trees: Mapping[str, xr.DataTree]) -> dict[str, NDArray[Any]]:

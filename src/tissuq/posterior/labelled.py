@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment import known_evidence_changes
+from tissuq.assessment.modulus import modulus
 from tissuq.errors import InputError
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
@@ -97,6 +98,10 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> d
     }
     labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
     labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
+    stiffness = modulus(solution)
+    numbers = float(stiffness.quantile(0.5)), *map(float, stiffness.hdi())
+    labels |= {f"modulus_{name}": value for name, value in zip(("median", "hdi_low", "hdi_high"), numbers, strict=True)}
+    labels["intervals_of"] = model.tolerances.meaning
     labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
     units = {parameter.symbol: ", in MPa" if parameter.unit else "" for parameter in model.parameters}
     labels |= {f"prior_{symbol}": f"{prior}{units[symbol]}" for symbol, prior in model.priors.items()}

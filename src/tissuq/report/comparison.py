@@ -74,8 +74,18 @@ def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]
 
 def comparison_warnings(table: pd.DataFrame) -> list[str]:
     """Return the warnings about a comparison."""
-    text = "Numbers marked rough are not reliable: a few influential measurements dominate the importance weights."
-    return [text] * bool(table["is_rough"].any())
+    warnings = []
+    if table["is_rough"].any():
+        warnings.append(
+            "Numbers marked rough are not reliable: a few influential measurements dominate the importance weights."
+        )
+    names = {
+        str(of): list(rows.index) for of, rows in table[table["intervals_of"] != ""].groupby("intervals_of", sort=False)
+    }
+    if len(names) > 1:
+        said = "; ".join(f"of {', '.join(map(str, fits))} they are of {of}" for of, fits in names.items())
+        warnings.append(f"The intervals are of different things, so that their widths cannot be compared: {said}.")
+    return warnings
 
 
 def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
