@@ -83,3 +83,16 @@ def test_a_run_that_is_typed_is_one_of_the_current_folder_also_beside_a_config(c
     said = cli("design", os.path.relpath(run), "--config", "mine/tests.toml", "--no-figures")
     assert said.status == 0, said.err
     assert "give the RUN folder" in cli("design", "--target", "modulus").err
+
+
+def test_what_to_do_next_repeats_the_modes_and_what_the_interval_is_of(cli, here, specimen):
+    assert cli("fit", specimen, "--estimand", "as-tested", "--noise-sd", 1, "--no-figures", "--out", "run").status == 0
+    said = cli("design", "run", *TESTS[:2], "--no-figures")
+    words = "tissuq fit DATA.csv NEW.csv --mode uniaxial --mode planar --estimand as-tested"
+    assert words in " ".join(said.out.split()), said.err
+
+
+def test_a_stress_that_is_known_is_no_target(cli, run):
+    said = cli("design", "run", *TESTS, "--target", "planar:1")
+    assert said.status == 2
+    assert "target 'planar:1': its value is known already" in said.err

@@ -196,3 +196,14 @@ def test_forces_of_an_axisymmetric_body_are_the_same_in_both_files(tmp_path):
     assert in_frd.of_set("RF", "TOP", "sum").values[-1, :, 1].sum() == pytest.approx(force, rel=1e-4)
     # A cylinder of radius 5 in tension by a fifth, nearly incompressible: 2 C10 (l - 1/l^2) pi r^2, over 180 sectors.
     assert force == pytest.approx(2 * 0.5 * (1.2 - 1.2**-2) * np.pi * 25 / 180, rel=0.02)
+
+
+def test_rows_in_the_axes_of_a_transform_are_told(tmp_path):
+    head = " displacements (vx,vy,vz) for set TOP and time  0.1000000E+01\n\n"
+    (tmp_path / "job.dat").write_text(
+        f"{head}         1  1.0E-01  0.0E+00  0.0E+00 L\n         2  1.0E-01  0.0E+00  0.0E+00 L\n"
+    )
+    assert read_dat(tmp_path / "job.dat")["displacements", "TOP"].is_local
+    results = CalculiXResults(tmp_path / "job.dat", Results(tmp_path, "job", node_sets={"TOP": {1, 2}}))
+    with pytest.raises(InputError, match=r"in the axes of [*]TRANSFORM: add GLOBAL=YES"):
+        results.of_set("U", "TOP", "mean")

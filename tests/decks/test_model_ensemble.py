@@ -74,4 +74,4 @@ def test_the_band_is_that_of_the_draws_that_reached_the_end():
     curves = np.column_stack([np.arange(8.0), np.r_[np.arange(5.0), [np.nan] * 3]])
     ensemble = ModelEnsemble({"q": np.array([0.5, 1.0])}, {"q": {"complete": curves}}, None, (), (), 0.0)
     (text,) = ensemble.warnings
-    assert text == "5 draws are too few for a 95 % band: the band is their range, a 67 % band."
+    assert text == "5 draws are too few for a 95 % band: the band is their range, which holds 67 %."

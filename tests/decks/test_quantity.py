@@ -14,6 +14,7 @@ from tissuq.decks.calculix_results import CalculiXResults, Frd
 from tissuq.decks.deck import deck_formats
 from tissuq.decks.model_run import check_sets
 from tissuq.decks.quantity import Results
+from tissuq.decks.solver import solver_named
 from tissuq.errors import InputError
 
 TABLES = """
@@ -216,3 +217,19 @@ def test_nodes_without_a_number_are_told_with_their_set(tmp_path):
     with pytest.raises(InputError, match=r"U1@ALL:mean.*'ALL'"):
         parse_quantity("q", "U1@ALL").read(results)
     assert parse_quantity("q", "U1@ONE").read(results).values.tolist() == [1.0]
+
+
+PRINTED = "*EL PRINT, ELSET=body\nS\n"
+
+
+@pytest.mark.parametrize(
+    ("printed", "wanted", "is_written"),
+    [(PRINTED, "S11@BODY", True), (PRINTED, "E11@BODY", False), ("", "S11@BODY", False), ("", "S11@TOP", True)],
+)
+def test_a_set_of_elements_is_refused_where_calculix_is_not_asked_to_print_it(tmp_path, printed, wanted, is_written):
+    mesh = "*NODE, NSET=TOP\n1, 0.\n*ELEMENT, TYPE=C3D4, ELSET=BODY\n1, 1, 1, 1, 1\n"
+    (tmp_path / "model.inp").write_text(f"{mesh}*MATERIAL, NAME=A\n*STEP\n{printed}*END STEP\n")
+    deck, quantities = Deck.read(tmp_path / "model.inp"), [parse_quantity("q", wanted)]
+    with nullcontext() if is_written else pytest.raises(InputError, match="'BODY' is a set of elements"):
+        check_sets(deck, quantities, solver_named("ccx"))
+    check_sets(deck, quantities)

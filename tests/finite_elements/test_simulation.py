@@ -120,7 +120,7 @@ def test_a_draw_that_ends_early_is_listed_and_counted_and_its_steps_are_kept(pos
 def test_a_reader_is_warned_of_strains_beyond_the_measurements_and_of_few_draws(found):
     texts = " ".join(simulation_warnings(replace(found, energy_beyond=np.full((4, 2), 0.4))))
     assert "with 40 % of the strain energy, is strained beyond what was measured" in texts
-    assert "4 draws are too few for a 95 % band: the band is their range, a 60 % band" in texts
+    assert "4 draws are too few for a 95 % band: the band is their range, which holds 60 %" in texts
     assert "compensate" in " ".join(
         simulation_warnings(replace(found, forces=found.forces | {"alone": -found.forces["complete"]}))
     )

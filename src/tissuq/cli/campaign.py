@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
 __all__ = ["check_folder", "write_campaign_recipe"]
 
+MAX_LETTERS = 300
+"""Of what is said of settings that differ."""
+
 
 def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = frozenset()) -> None:
     """Refuse a folder that is not empty, unless it is that of the same campaign.
@@ -30,8 +33,13 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
         return
     if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    if _without(recipe.read_text(encoding="utf-8"), free) != _without(_recipe(settings), free):
-        raise InputError(f"'{folder}' holds a campaign with other settings; choose another folder with --out.")
+    there, here = _without(recipe.read_text(encoding="utf-8"), free), _without(_recipe(settings), free)
+    if there != here:
+        names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+        said = ", ".join(f"{name}: {there.get(name, 'none')} there, {here.get(name, 'none')} here" for name in names)
+        raise InputError(
+            f"'{folder}' holds a campaign with other settings ({said:.{MAX_LETTERS}}): choose another folder (--out)."
+        )
 
 
 def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
@@ -48,14 +56,14 @@ def _unfinished(recipe: Path) -> str:
     return f"{recipe.name}.new"
 
 
-def _without(recipe: str, names: frozenset[str]) -> dict[str, Any] | None:
-    """Return the settings of a recipe without some of them, None where it is damaged."""
+def _without(recipe: str, names: frozenset[str]) -> dict[str, Any]:
+    """Return the settings of a recipe without some of them, none where it is damaged."""
     import tomllib
 
     try:
         return {name: value for name, value in tomllib.loads(recipe).items() if name not in names}
     except tomllib.TOMLDecodeError:
-        return None
+        return {}
 
 
 def _recipe(settings: BaseModel) -> str:

@@ -51,8 +51,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     from tissuq.report.run_folder import check_apart
     from tissuq.report.source_run import check_source
     from tissuq.report.terminal import print_explanations
-    from tissuq.studies.ensemble import prepare_ensemble, run_ensemble
-    from tissuq.studies.ensemble_files import forget_failures
+    from tissuq.studies.ensemble import forget_failures, prepare_ensemble, run_ensemble
     from tissuq.studies.stream import open_pool
 
     how, settings, beside = call.how, _settings(call), call.beside
@@ -82,7 +81,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
             retries=how.retries, keep=how.keep, abaqus=how.abaqus, progress=call.campaign_in(folder),
         )  # fmt: skip
     print_explanations(prepared.card_warnings)
-    call.put_into(folder, ensemble_result(study, folder), figures=how.figures)
+    call.put_into(folder, ensemble_result(study, folder, beside), figures=how.figures)
 
 
 def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings:

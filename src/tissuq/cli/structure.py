@@ -70,4 +70,4 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
             settings, posteriors, folder, beside=beside, prepare=prepare, pool=pool, progress=campaign
         )
     print_warnings(list(dict.fromkeys(str(warning.message) for warning in raised)))
-    call.put_into(folder, simulation_result(study, folder), figures=call.how.figures)
+    call.put_into(folder, simulation_result(study, folder, source), figures=call.how.figures)

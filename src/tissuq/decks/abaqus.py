@@ -43,7 +43,6 @@ class Keyword:
     name: str
     parameters: dict[str, str]
     start: int
-    data_start: int
     end: int
     data: tuple[str, ...]
 
@@ -74,7 +73,7 @@ def keywords_of(content: bytes) -> Iterator[Keyword]:
         parameters = {_joined(key): value.strip().strip('"') for key, _, value in pairs if key.strip()}
         end = body[-1].end if body else head[-1].end
         data = tuple(line.text.strip() for line in body)
-        yield Keyword(_joined(name), parameters, head[0].start, head[-1].end, end, data)
+        yield Keyword(_joined(name), parameters, head[0].start, end, data)
 
 
 def _joined(word: str) -> str:
@@ -119,6 +118,15 @@ class AbaqusDeck(DeckFormat):
         keywords = [keyword for content in files for keyword in keywords_of(content) if keyword.name not in USERS]
         return {
             keyword.parameters[name].upper() for keyword in keywords for name in wanted if name in keyword.parameters
+        }
+
+    def printed_elements(self, files: Sequence[bytes]) -> set[tuple[str, str]]:
+        printing = [keyword for content in files for keyword in keywords_of(content) if keyword.name == "ELPRINT"]
+        return {
+            (word.strip().upper(), keyword.parameters.get("ELSET", "").upper())
+            for keyword in printing
+            for line in keyword.data
+            for word in line.split(",")
         }
 
     def mesh_size(self, files: Sequence[bytes]) -> MeshSize | None:

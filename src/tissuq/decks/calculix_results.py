@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tissuq.decks.result_file import ResultFile, Values
 from tissuq.errors import InputError
 
-__all__ = ["CELL_TYPES", "CalculiXResults", "Frd", "Table", "read_dat", "read_frd", "tensor_of"]
+__all__ = ["CELL_TYPES", "SECTORS_OF_RING", "CalculiXResults", "Frd", "Table", "read_dat", "read_frd", "tensor_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -92,12 +92,21 @@ class CalculiXResults(ResultFile):
         return Values(np.array([time for time, _ in steps]), values)
 
     def of_set(self, kind: str, set_name: str, how: str) -> Values | None:
+        is_local = False
         for what in TABLES[kind]:
             table = self.tables.get((what, set_name))
             if table is not None and (how == "sum" or not what.startswith("total")):
-                columns = dict(zip(table.columns, np.moveaxis(table.values, -1, 0), strict=True))
-                return Values(table.times, _components(columns, kind))
-        return super().of_set(kind, set_name, how)
+                if not table.is_local:
+                    columns = dict(zip(table.columns, np.moveaxis(table.values, -1, 0), strict=True))
+                    return Values(table.times, _components(columns, kind))
+                is_local = True
+        found = super().of_set(kind, set_name, how)
+        if found is None and is_local:
+            raise InputError(
+                f"'{self.path.stem}.dat' has it in the axes of *TRANSFORM: add GLOBAL=YES to '*NODE PRINT, "
+                f"NSET={set_name}', or write *NODE FILE, too."
+            )
+        return found
 
 
 def _components(columns: Mapping[str, FloatArray], kind: str) -> FloatArray:
@@ -115,11 +124,15 @@ def tensor_of(columns: Mapping[str, FloatArray]) -> list[FloatArray]:
 
 
 class Table(NamedTuple):
-    """A quantity of a set in ``.dat``: its times (t,), and the columns of the rows then, (t, rows, columns)."""
+    """A quantity of a set in ``.dat``: its times (t,), and the columns of the rows then, (t, rows, columns).
+
+    It is local where the rows are in the axes of a ``*TRANSFORM``.
+    """
 
     columns: tuple[str, ...]
     times: FloatArray
     values: FloatArray
+    is_local: bool = False
 
 
 def read_dat(path: Path) -> dict[tuple[str, str], Table]:
@@ -129,6 +142,7 @@ def read_dat(path: Path) -> dict[tuple[str, str], Table]:
     """
     by_table: dict[tuple[str, str], tuple[tuple[str, ...], list[float], list[list[list[float]]]]] = {}
     rows: list[list[float]] | None = None
+    local: set[tuple[str, str]] = set()
     skip = 0
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         head = TABLE.match(line)
@@ -137,16 +151,24 @@ def read_dat(path: Path) -> dict[tuple[str, str], Table]:
             skip = 0 if head["what"].startswith("total") else 1
             if names[:2] == ["elem", "integ.pnt."]:
                 names, skip = names[2:], 2
-            _, times, tables = by_table.setdefault((head["what"], head["set"]), (tuple(names), [], []))
+            key = head["what"], head["set"]
+            _, times, tables = by_table.setdefault(key, (tuple(names), [], []))
             rows = []
             times.append(float(head["time"]))
             tables.append(rows)
         elif rows is not None and line.strip():
+            words = line.split()[skip:]
+            if words[-1:] == ["L"]:
+                local.add(key)
+                words.pop()
             try:
-                rows.append([float(word) for word in line.split()[skip:]])
+                rows.append([float(word) for word in words])
             except ValueError:
                 rows = None
-    return {key: Table(names, np.array(times), np.array(values)) for key, (names, times, values) in by_table.items()}
+    return {
+        key: Table(names, np.array(times), np.array(values), key in local)
+        for key, (names, times, values) in by_table.items()
+    }
 
 
 @dataclass(frozen=True)

@@ -137,6 +137,10 @@ class DeckFormat(ABC):
         """
         return set()
 
+    def printed_elements(self, files: Sequence[bytes]) -> set[tuple[str, str]]:
+        """Return which fields (``S``, ``E``) of which sets of elements files have printed, where that is known."""
+        return set()
+
     def mesh_size(self, files: Sequence[bytes]) -> MeshSize | None:
         """Return the number of elements of most dimensions, and these; None where they are not known."""
         return None

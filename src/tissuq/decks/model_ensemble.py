@@ -14,15 +14,14 @@ from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, FINE_MESH, MATERIAL_ONLY, MIN_DRAWS
 from tissuq.finite_elements.spread import (
     BAND,
-    PROBABILITY,
     SHARES,
-    band_probability,
     force_table,
     mesh_factor,
     mesh_free,
+    too_few_draws,
 )
 from tissuq.finite_elements.warnings import MIN_MESH_CHANGE
-from tissuq.posterior.draws_in_words import failed_draws
+from tissuq.posterior.draws_in_words import FailedDraw, failed_draws
 from tissuq.posterior.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -43,13 +42,9 @@ MIN_SHARE_BEYOND = 0.02
 
 
 @dataclass(frozen=True)
-class FailedRun:
-    """A run that did not end well: its family, its number, the last time that it reached, why, and the last lines."""
+class FailedRun(FailedDraw):
+    """A run that did not end well, with the last lines of the solver and its folder."""
 
-    family: str
-    number: int
-    reached: float
-    problem: str
     lines: tuple[str, ...]
     folder: str
 
@@ -311,7 +306,4 @@ def _without_spread(ensemble: ModelEnsemble) -> list[str]:
 
 def _too_few(ensemble: ModelEnsemble) -> list[str]:
     count = min(int(np.isfinite(ensemble.last_values(name)).sum()) for name in ensemble.curves)
-    probability = band_probability(count)
-    if probability >= PROBABILITY:
-        return []
-    return [f"{count} draws are too few for a 95 % band: the band is their range, a {100 * probability:.0f} % band."]
+    return too_few_draws(count)

@@ -21,7 +21,7 @@ from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
 from tissuq.decks.quantity import Component, Quantity, Results
 from tissuq.decks.result_file import ALL, unknown_set
-from tissuq.decks.solver import LOG, Solver
+from tissuq.decks.solver import LOG, CalculiXSolver, Solver
 from tissuq.errors import InputError
 
 __all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "check_sets", "clear_unfinished", "problem_of", "sets_of"]
@@ -156,8 +156,8 @@ def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
     return deck.format.node_sets(list(deck.files.values())) if is_needed else {}
 
 
-def check_sets(deck: Deck, quantities: Iterable[Quantity]) -> None:
-    """Refuse a quantity of a set that the deck does not have, where all of its sets are known.
+def check_sets(deck: Deck, quantities: Iterable[Quantity], solver: Solver | None = None) -> None:
+    """Refuse a quantity of a set that the deck does not have, where all are known, or that the solver does not write.
 
     Raises
     ------
@@ -170,6 +170,20 @@ def check_sets(deck: Deck, quantities: Iterable[Quantity]) -> None:
             known = deck.format.set_names(list(deck.files.values()), of_elements=of_elements)
             if known and quantity.set_name.rpartition(".")[2] not in known:  # those of instances are PART-1-1.TOP
                 raise InputError(f"{quantity.text}: {unknown_set(quantity.set_name, known)}")
+            if known and of_elements and isinstance(solver, CalculiXSolver):
+                _check_printed(deck, quantity)
+
+
+def _check_printed(deck: Deck, quantity: Component) -> None:
+    """Refuse a field in a set of elements that CalculiX is not asked to print."""
+    files, set_name = list(deck.files.values()), quantity.set_name
+    if set_name in deck.format.set_names(files, of_elements=False):
+        return
+    if (quantity.kind, set_name) not in deck.format.printed_elements(files):
+        raise InputError(
+            f"{quantity.text}: '{set_name}' is a set of elements, of which CalculiX writes only what it is asked to "
+            f"print: add '*EL PRINT, ELSET={set_name}' with {quantity.kind} to the step, or name a set of nodes."
+        )
 
 
 def _digest(*parts: object) -> str:

@@ -6,9 +6,10 @@ from tissuq.finite_elements.inflated import InflatedBody
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.finite_elements.plate import PlateWithHole
 from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond
-from tissuq.finite_elements.simulation import Failure, Simulation, simulate
+from tissuq.finite_elements.simulation import Simulation, simulate
 from tissuq.finite_elements.sphere import SphericalIndentation
 from tissuq.finite_elements.spread import Band, Shares, band_of, shares_of
+from tissuq.posterior.draws_in_words import FailedDraw
 
 __all__ = [
     "Band",
@@ -16,7 +17,7 @@ __all__ = [
     "Case",
     "ClampedBar",
     "FElupeMaterial",
-    "Failure",
+    "FailedDraw",
     "Indentation",
     "InflatedBody",
     "Mesh",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import lru_cache
 from hashlib import sha256
 from math import inf
@@ -201,8 +202,11 @@ class BodyFromFile(Case):
         axes = AXES[: mesh.points.shape[1]]
         for name in (*(self.hold or {}), *self._named):
             if name not in sets or not len(sets[name]):
+                near = get_close_matches(name.casefold(), [known.casefold() for known in sets])
+                meant = [known for known in sets if known.casefold() in near]
+                hint = f" Did you mean {' or '.join(map(repr, meant))}?" if meant else ""
                 raise InputError(
-                    f"the mesh '{self.file}' has no set of points '{name}'; its sets are {', '.join(sets)}."
+                    f"the mesh '{self.file}' has no set of points '{name}'; its sets are {', '.join(sets)}.{hint}"
                 )
         for name, directions in (self.hold or {}).items():
             if not directions or set(directions) - set(axes):

@@ -15,6 +15,7 @@ from tissuq.finite_elements.first_order import controlled, draws_in_full, first_
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.response import BULK_RATIO, Run, Solve, run_in_turn
 from tissuq.finite_elements.spread import force_table, mesh_factor, mesh_free
+from tissuq.posterior.draws_in_words import FailedDraw
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.posterior.posterior import Posterior
 
@@ -27,7 +28,6 @@ __all__ = [
     "FINE_MESH",
     "MATERIAL_ONLY",
     "WITHOUT",
-    "Failure",
     "Simulation",
     "noise_share",
     "simulate",
@@ -51,16 +51,6 @@ MIN_DRAWS = 2
 
 
 @dataclass(frozen=True)
-class Failure:
-    """A draw that did not reach the end: its family, its number, how far it got (mm), and the reason."""
-
-    family: str
-    number: int
-    reached: float
-    problem: str
-
-
-@dataclass(frozen=True)
 class Simulation:
     """Forces of draws in a case.
 
@@ -71,7 +61,7 @@ class Simulation:
     forces : mapping of str to (N, s) array, N
         By family: ``complete``, ``alone`` (the same draws without discrepancy) and ``without`` (draws of a fit without
         discrepancy); not a number where a draw did not get that far. Families that do not apply are missing.
-    failures : tuple of Failure
+    failures : tuple of FailedDraw
     volume_beyond, energy_beyond : (N, s) arrays
         Shares of the volume that is strained beyond what was measured, and of the energy that is there; not a number
         where a draw was not computed in full, or not that far.
@@ -99,7 +89,7 @@ class Simulation:
     case: Case
     travel: FloatArray
     forces: Mapping[str, FloatArray]
-    failures: tuple[Failure, ...]
+    failures: tuple[FailedDraw, ...]
     volume_beyond: FloatArray
     energy_beyond: FloatArray
     max_invariants: tuple[float, float]
@@ -317,10 +307,10 @@ def _quantity(
     return rows * np.array([task.modulus for task in tasks])[:, None] if scaled else rows
 
 
-def _failures(tasks: Mapping[str, Sequence[Solve]], results: Mapping[str, dict[str, Any]]) -> list[Failure]:
+def _failures(tasks: Mapping[str, Sequence[Solve]], results: Mapping[str, dict[str, Any]]) -> list[FailedDraw]:
     solves = ((family, task.draw.number, results[task.key]) for family in tasks for task in tasks[family])
     return [
-        Failure(family, number, result["reached"], problem)
+        FailedDraw(family, number, result["reached"], problem)
         for family, number, result in solves
         if (problem := result["problem"])
     ]

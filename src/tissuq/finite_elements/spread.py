@@ -29,6 +29,7 @@ __all__ = [
     "parts_of",
     "shares_of",
     "standard_errors",
+    "too_few_draws",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -91,6 +92,16 @@ def band_probability(draws: int) -> float:
     (0.95, 0.88)
     """
     return min(PROBABILITY, (draws - 1) / (draws + 1))
+
+
+def too_few_draws(count: int) -> list[str]:
+    """Return a warning where so many draws are too few for the ends of a band."""
+    probability = band_probability(count)
+    if probability >= PROBABILITY:
+        return []
+    return [
+        f"{count} draws are too few for a 95 % band: the band is their range, which holds {100 * probability:.0f} %."
+    ]
 
 
 def band_of(values: FloatArray) -> Band:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, Simulation
-from tissuq.finite_elements.spread import PROBABILITY, band_probability, shares_of
+from tissuq.finite_elements.spread import shares_of, too_few_draws
 from tissuq.posterior.draws_in_words import failed_draws
 
 __all__ = ["MIN_MESH_CHANGE", "simulation_warnings"]
@@ -74,11 +74,7 @@ def _compensated(simulation: Simulation) -> list[str]:
 
 
 def _too_few_draws(simulation: Simulation) -> list[str]:
-    count = int(np.isfinite(simulation.forces[COMPLETE]).sum(axis=0).max())
-    probability = band_probability(count)
-    if probability >= PROBABILITY:
-        return []
-    return [f"{count} draws are too few for a 95 % band: the band is their range, a {100 * probability:.0f} % band."]
+    return too_few_draws(int(np.isfinite(simulation.forces[COMPLETE]).sum(axis=0).max()))
 
 
 def _coarse_mesh(simulation: Simulation) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol
+from dataclasses import dataclass
 
 __all__ = ["MAX_DRAWS_NAMED", "FailedDraw", "failed_draws", "named_draws"]
 
@@ -11,17 +11,14 @@ MAX_DRAWS_NAMED = 6
 """Largest number of draws that a sentence names; a table has all of them."""
 
 
-class FailedDraw(Protocol):
-    """A draw that failed: its family, its number from zero, how far it got, and why."""
+@dataclass(frozen=True)
+class FailedDraw:
+    """A draw that did not get to the end: its family, its number from zero, how far it got (mm, or time), and why."""
 
-    @property
-    def family(self) -> str: ...
-    @property
-    def number(self) -> int: ...
-    @property
-    def reached(self) -> float: ...
-    @property
-    def problem(self) -> str: ...
+    family: str
+    number: int
+    reached: float
+    problem: str
 
 
 def named_draws(numbers: Iterable[int], places: Sequence[str] = ()) -> str:

@@ -194,9 +194,9 @@ class Ensemble(Sequence[EnergyDraw]):
             ),
         )
 
-    def stress(self, mode: LoadingMode | Path, stretch: FloatArray) -> FloatArray:
+    def stress(self, mode: str | LoadingMode | Path, stretch: FloatArray) -> FloatArray:
         """Return the engineering stresses (N, n), MPa, of all draws at points (n,) of a mode of one stress."""
-        return self.stresses_at(mode.at(stretch))
+        return self.stresses_at((loading_mode(mode) if isinstance(mode, str) else mode).at(np.asarray(stretch)))
 
     def stresses_at(self, states: States) -> FloatArray:
         """Return the engineering stresses (N, n), MPa, of all draws at states (n,)."""

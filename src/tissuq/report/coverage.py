@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from tissuq.report.coverage_figures import campaign_figures, shares_figure
+from tissuq.report.coverage_figures import coverage_figure, family_figure, shares_figure, unseen_figure
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.tables import significant
 from tissuq.validation.coverage import CoverageSettings, summarise, summarise_unseen
@@ -86,10 +85,9 @@ def numbers_of_shares(table: pd.DataFrame, column: str, prob: float, words: str)
 
 def _sections(settings: CoverageSettings, tables: dict[str, pd.DataFrame], percent: str) -> tuple[Section, ...]:
     """Return what a page folds: coverage and price, other loading modes, families, how to read it."""
-    figures = cache(lambda: campaign_figures(tables, settings.prob))
     is_series = len(settings.strengths) > 1
     coverage = Picture(
-        "coverage", lambda: figures()["coverage"],
+        "coverage", lambda: coverage_figure(tables["summary"], settings.prob),
         f"Coverage and price {'over the strength of the error of the model' if is_series else 'of every formulation'}",
         f"Left: share of intervals that hold the truth. Right: interval score over the width of an oracle's. {BARS}."
         if is_series
@@ -97,16 +95,23 @@ def _sections(settings: CoverageSettings, tables: dict[str, pd.DataFrame], perce
     )  # fmt: skip
     sections = [Section("Coverage and its price", (coverage,))]
     if settings.unseen:
-        unseen = Picture("unseen", lambda: figures()["unseen"], "Coverage and error in unseen loading modes",
-                         f"Coverage and error of the stress in other loading modes. {BARS}.")  # fmt: skip
+        unseen = Picture(
+            "unseen",
+            lambda: unseen_figure(tables["unseen"], settings.prob),
+            "Coverage and error in unseen loading modes",
+            f"Coverage and error of the stress in other loading modes. {BARS}.",
+        )
         headers, rows = _readable_unseen(tables["unseen"])
         table = Table(headers, rows, text_columns=_words(headers))
         words = MODES.format(percent=percent)
         sections.append(Section("Stress in loading modes that were not measured", (words, unseen, table)))
     if tables["families"]["family"].nunique() > 1:
-        families = Picture("families", lambda: figures()["families"], "Coverage by family and design",
-                           "Share of intervals that hold the truth, in percent: white where it is nominal, orange "
-                           "where it is lower.")  # fmt: skip
+        families = Picture(
+            "families",
+            lambda: family_figure(tables["families"], settings.prob),
+            "Coverage by family and design",
+            "Share of intervals that hold the truth, in percent: white where it is nominal, orange where it is lower.",
+        )
         headers, rows = readable_coverage(tables["families"])
         table = Table(headers, rows, text_columns=_words(headers))
         sections.append(Section("By family", (families, table)))

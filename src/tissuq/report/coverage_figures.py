@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import legend_above
-from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, MARKERS, SERIES, STYLE, TRUTH, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, MARKERS, SERIES, TRUTH, new_figure
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["campaign_figures", "dots_by_row", "panel_grid", "shares_figure"]
+__all__ = ["coverage_figure", "dots_by_row", "family_figure", "panel_grid", "shares_figure", "unseen_figure"]
 
 COLORS = SERIES
 CELL = ["design", "strength", "noise"]
@@ -28,22 +29,9 @@ WIDE_ROW = 3
 """Panels in a row from which the figure keeps its width."""
 
 
-def campaign_figures(tables: Mapping[str, pd.DataFrame], prob: float) -> dict[str, Figure]:
-    """Return the figures of a campaign by name, from its tables: summary, families and, where there is one, unseen.
-
-    There is none by family where there is one family only.
-    """
-    from matplotlib import rc_context
-
-    summary, families = tables["summary"], tables["families"]
-    is_series = summary["strength"].nunique() > 1
-    with rc_context(STYLE):
-        figures = {"coverage": (_of_strength if is_series else _overview)(summary, prob)}
-        if families["family"].nunique() > 1:
-            figures["families"] = _by_family(families, prob)
-        if "unseen" in tables:
-            figures["unseen"] = _of_unseen(tables["unseen"], prob)
-    return figures
+def coverage_figure(summary: pd.DataFrame, prob: float) -> Figure:
+    """Return coverage and price of the formulations, over the strength of the model's error where this is a series."""
+    return (_of_strength if summary["strength"].nunique() > 1 else _overview)(summary, prob)
 
 
 def shares_figure(table: pd.DataFrame, column: str, nominal: float, label: str) -> Figure:
@@ -68,21 +56,21 @@ def _overview(summary: pd.DataFrame, prob: float) -> Figure:
     else:
         panels = [(_labels(rows)[0], list(rows["formulation"]), rows) for _, rows in summary.groupby(CELL, sort=False)]
     tall = max(len(labels) for _, labels, _ in panels)
-    figure, axes = panel_grid(len(panels), len(measures), 0.75 + 0.24 * tall)
-    for row, (title, labels, table) in zip(axes, panels, strict=True):
-        heights = list(range(len(labels)))[::-1]
-        for axis, measure in zip(row, measures, strict=True):
-            _dots(axis, table, measure, heights, prob)
-            axis.set_yticks(heights, labels if axis is row[0] else [""] * len(labels))
-            axis.set_ylim(-0.7, len(labels) - 0.3)
-        row[0].set_title(title)
-    texts = {
-        "coverage": f"{100 * prob:g} % intervals that hold the true C10 [%]",
-        "price": "mean score ●, median width ○; oracle's width = 1",
-        "predictive": f"new measurements in the {100 * prob:g} % band [%]",
-    }
-    for axis, measure in zip(axes[-1], measures, strict=True):
-        axis.set_xlabel(texts[measure])
+    with panel_grid(len(panels), len(measures), 0.75 + 0.24 * tall) as (figure, axes):
+        for row, (title, labels, table) in zip(axes, panels, strict=True):
+            heights = list(range(len(labels)))[::-1]
+            for axis, measure in zip(row, measures, strict=True):
+                _dots(axis, table, measure, heights, prob)
+                axis.set_yticks(heights, labels if axis is row[0] else [""] * len(labels))
+                axis.set_ylim(-0.7, len(labels) - 0.3)
+            row[0].set_title(title)
+        texts = {
+            "coverage": f"{100 * prob:g} % intervals that hold the true C10 [%]",
+            "price": "mean score ●, median width ○; oracle's width = 1",
+            "predictive": f"new measurements in the {100 * prob:g} % band [%]",
+        }
+        for axis, measure in zip(axes[-1], measures, strict=True):
+            axis.set_xlabel(texts[measure])
     return figure
 
 
@@ -101,13 +89,12 @@ def _dots(axis: Axes, table: pd.DataFrame, measure: str, heights: list[int], pro
     axis.errorbar(factor * table[measure], heights, xerr=error, fmt="o", markersize=4, color=BAND)
 
 
-def _by_family(families: pd.DataFrame, prob: float) -> Figure:
+def family_figure(families: pd.DataFrame, prob: float) -> Figure:
     """Draw coverage by family as a table of colours, a panel a formulation and a column a design.
 
     Where there is one design only, formulations take the place of designs.
     """
     from matplotlib.colors import LinearSegmentedColormap
-    from matplotlib.figure import Figure
 
     families = families.assign(cell=_labels(families))
     if families["cell"].nunique() == 1:
@@ -121,15 +108,15 @@ def _by_family(families: pd.DataFrame, prob: float) -> Figure:
     )
     beneath = 0.4 + 0.08 * max(map(len, columns))
     width = max(9.0, 1.6 + across * (0.62 * len(columns) + 0.3))
-    figure = Figure(figsize=(width, down * (0.27 * len(names) + 0.4) + beneath))
-    axes = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
-    for axis in axes[len(panels) :]:
-        axis.remove()
-    for axis, (title, rows) in zip(axes, panels, strict=False):
-        table = rows.pivot_table("coverage", "family", "cell", sort=False, aggfunc="first")
-        values = table.reindex(index=names, columns=columns).to_numpy()
-        pieces.heat(axis, _shade(values, prob), 100 * values, columns, names, colors)
-        axis.set_title(str(title))
+    with new_figure(width, down * (0.27 * len(names) + 0.4) + beneath) as figure:
+        axes = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
+        for axis in axes[len(panels) :]:
+            axis.remove()
+        for axis, (title, rows) in zip(axes, panels, strict=False):
+            table = rows.pivot_table("coverage", "family", "cell", sort=False, aggfunc="first")
+            values = table.reindex(index=names, columns=columns).to_numpy()
+            pieces.heat(axis, _shade(values, prob), 100 * values, columns, names, colors)
+            axis.set_title(str(title))
     return figure
 
 
@@ -141,45 +128,49 @@ def _shade(values: Any, prob: float) -> Any:
 def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
     """Draw coverage and price over the strength of the model's error, a line a formulation."""
     panels = list(summary.groupby(["design", "noise"], sort=False))
-    figure, axes = panel_grid(len(panels), 2, 2.6)
-    for row, ((design, noise), table) in zip(axes, panels, strict=True):
-        for index, (name, line) in enumerate(table.groupby("formulation", sort=False)):
-            style: dict[str, Any] = {"color": COLORS[index % len(COLORS)], "marker": MARKERS[index % len(MARKERS)]}
-            style |= {"markersize": 4, "label": name}
-            error = 100 * BAR_HALF_WIDTH * line["coverage_error"]
-            row[0].errorbar(line["strength"], 100 * line["coverage"], yerr=error, **style)
-            row[1].errorbar(line["strength"], line["price"], yerr=BAR_HALF_WIDTH * line["price_error"], **style)
-        row[0].axhline(100 * prob, color=BASE, linewidth=1, zorder=0)
-        row[0].set_ylabel("intervals that hold C10 [%]")
-        row[1].set_ylabel("mean score / oracle's width")
-        row[1].set_yscale("log")
-        row[1].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        row[1].yaxis.set_minor_formatter("")
-        row[0].set_title(str(design) if summary["noise"].nunique() == 1 else f"{design}, {noise} noise")
-    for axis in axes[-1]:
-        axis.set_xlabel("strength of the error of the model")
-    legend_above(figure, axes[0][:1], 5, font_size=10)
+    with panel_grid(len(panels), 2, 2.6) as (figure, axes):
+        for row, ((design, noise), table) in zip(axes, panels, strict=True):
+            for index, (name, line) in enumerate(table.groupby("formulation", sort=False)):
+                style: dict[str, Any] = {"color": COLORS[index % len(COLORS)], "marker": MARKERS[index % len(MARKERS)]}
+                style |= {"markersize": 4, "label": name}
+                error = 100 * BAR_HALF_WIDTH * line["coverage_error"]
+                row[0].errorbar(line["strength"], 100 * line["coverage"], yerr=error, **style)
+                row[1].errorbar(line["strength"], line["price"], yerr=BAR_HALF_WIDTH * line["price_error"], **style)
+            row[0].axhline(100 * prob, color=BASE, linewidth=1, zorder=0)
+            row[0].set_ylabel("intervals that hold C10 [%]")
+            row[1].set_ylabel("mean score / oracle's width")
+            row[1].set_yscale("log")
+            row[1].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            row[1].yaxis.set_minor_formatter("")
+            row[0].set_title(str(design) if summary["noise"].nunique() == 1 else f"{design}, {noise} noise")
+        for axis in axes[-1]:
+            axis.set_xlabel("strength of the error of the model")
+        legend_above(figure, axes[0][:1], 5, font_size=10)
     return figure
 
 
-def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
+def unseen_figure(unseen: pd.DataFrame, prob: float) -> Figure:
     """Draw coverage and error of the true stress in other loading modes, a row of panels a design and noise."""
     panels = list(unseen.groupby(CELL, sort=False))
     names = list(dict.fromkeys(unseen["formulation"]))
-    figure, axes = panel_grid(len(panels), 2, 0.75 + 0.3 * len(names))
-    for row, (_, table) in zip(axes, panels, strict=True):
-        for axis, measure in zip(row, ("coverage", "error"), strict=True):
-            series = {
-                str(mode): (rows["formulation"], 100 * rows[measure], BAR_HALF_WIDTH * 100 * rows[f"{measure}_error"])
-                for mode, rows in table.groupby("mode", sort=False)
-            }
-            dots_by_row(axis, names, series, 100 * prob if measure == "coverage" else None, is_named=axis is row[0])
-        row[0].set_xlim(-2, 102)
-        row[0].set_title(_labels(table)[0])
-    axes[-1][1].set_xlim(left=0)
-    axes[-1][0].set_xlabel(f"true stress in the {100 * prob:g} % band [%]")
-    axes[-1][1].set_xlabel("median error of the predicted median [%]")
-    legend_above(figure, axes[0][:1], font_size=10)
+    with panel_grid(len(panels), 2, 0.75 + 0.3 * len(names)) as (figure, axes):
+        for row, (_, table) in zip(axes, panels, strict=True):
+            for axis, measure in zip(row, ("coverage", "error"), strict=True):
+                series = {
+                    str(mode): (
+                        rows["formulation"],
+                        100 * rows[measure],
+                        BAR_HALF_WIDTH * 100 * rows[f"{measure}_error"],
+                    )
+                    for mode, rows in table.groupby("mode", sort=False)
+                }
+                dots_by_row(axis, names, series, 100 * prob if measure == "coverage" else None, is_named=axis is row[0])
+            row[0].set_xlim(-2, 102)
+            row[0].set_title(_labels(table)[0])
+        axes[-1][1].set_xlim(left=0)
+        axes[-1][0].set_xlabel(f"true stress in the {100 * prob:g} % band [%]")
+        axes[-1][1].set_xlabel("median error of the predicted median [%]")
+        legend_above(figure, axes[0][:1], font_size=10)
     return figure
 
 
@@ -213,13 +204,11 @@ def dots_by_row(
         axis.axvline(nominal, color=BASE, linewidth=1, zorder=0)
 
 
-def panel_grid(down: int, across: int, height: float) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure with rows of panels that share their horizontal axes."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.9 * across if across < WIDE_ROW else 11.5, down * height + 0.5))
-    axes = figure.subplots(down, across, squeeze=False, sharex="col")
-    return figure, axes.tolist()
+@contextmanager
+def panel_grid(down: int, across: int, height: float) -> Iterator[tuple[Figure, list[list[Axes]]]]:
+    """Give a figure with rows of panels that share their horizontal axes, to draw on."""
+    with new_figure(4.9 * across if across < WIDE_ROW else 11.5, down * height + 0.5) as figure:
+        yield figure, figure.subplots(down, across, squeeze=False, sharex="col").tolist()
 
 
 def _labels(table: pd.DataFrame) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
-from tissuq.model.tolerances import SPECIMEN, TISSUE
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.candidates import Target
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import Row, significant
@@ -34,18 +34,20 @@ CAPTION = (
     "Expected standard deviation after each test, the best on top. Lines reach from it to the standard deviation now; "
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
 )
-NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{estimand}"
+NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{options}"
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")
 """Columns in the unit of a target."""
 
 
 def _next_step(study: DesignStudy) -> str:
-    """Return what to do, with the estimand for which the expected reduction holds."""
-    is_other = study.specimen == "other"
-    estimand = study.posterior.model.tolerances.estimand if is_other else ""
-    of_estimand = f" --estimand {estimand}" if estimand in (SPECIMEN, TISSUE) else ""
-    return NEXT.format(whose=" on another specimen" * is_other, estimand=of_estimand)
+    """Return what to do, with the estimand for which the expected reduction holds, and the modes of both files."""
+    model, is_other = study.posterior.model, study.specimen == "other"
+    estimands = (SPECIMEN, TISSUE) if is_other else (AS_TESTED,)
+    estimand = f" --estimand {model.tolerances.estimand}" * (model.tolerances.estimand in estimands)
+    best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
+    modes = f" --mode {model.experiment.mode.name} --mode {best['mode']}" * (len(model.experiment.tests) == 1)
+    return NEXT.format(whose=" on another specimen" * is_other, options=modes + estimand)
 
 
 def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:

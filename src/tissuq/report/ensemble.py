@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import shutil
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,22 +14,34 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.decks import FunctionQuantity
+from tissuq.decks.calculix_results import SECTORS_OF_RING
 from tissuq.decks.fields import FinalFields
 from tissuq.decks.model_run import FIELDS
+from tissuq.decks.quantity import Component
+from tissuq.decks.solver import CalculiXSolver
 from tissuq.experiments.units import stress_unit
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
-from tissuq.finite_elements.spread import band_probability
-from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
+from tissuq.report.band_table import (
+    LABELS,
+    band_cells,
+    is_mesh_free,
+    largest_share,
+    last_row,
+    mesh_change,
+    of_sources,
+    percent_of,
+    prefix_of,
+    share_cell,
+    shares_in,
+)
+from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
-from tissuq.report.simulation_figures import LABELS, is_mesh_free, of_sources, prefix_of, shares_in
 from tissuq.report.tables import significant
-from tissuq.studies.ensemble import EnsembleStudy
-from tissuq.studies.ensemble_files import DRAWS
+from tissuq.studies.ensemble import DRAWS, EnsembleStudy
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-    from matplotlib.figure import Figure
 
 __all__ = ["copy_functions", "ensemble_result", "readable_quantities"]
 
@@ -67,8 +80,11 @@ def copy_functions(study_quantities: tuple[object, ...], folder: Path) -> dict[s
     return texts
 
 
-def ensemble_result(study: EnsembleStudy, folder: Path) -> Result:
-    """Return what an ensemble of a user's model says; its folder holds the recipe, the model and the runs."""
+def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -> Result:
+    """Return what an ensemble of a user's model says; its folder holds the recipe, the model and the runs.
+
+    The relative paths of its settings lie in ``beside``.
+    """
     result, prepared = study.result, study.prepared
     tables = {name: result.table(name) for name in result.curves}
     stored = [folder / DRAWS / name / FIELDS for name in result.folders]
@@ -76,7 +92,7 @@ def ensemble_result(study: EnsembleStudy, folder: Path) -> Result:
     has_fields = len(fields) > 1 and find_spec("meshio") is not None
     for name in ("fields.vtu", "failures.csv"):
         (folder / name).unlink(missing_ok=True)
-    figures = cache(lambda: ensemble_figures(result, fields, prepared.tasks(folder)[0].limits))
+    limits = prepared.tasks(folder)[0].limits
     headers, rows = readable_quantities(study)
     count = len(prepared.ensembles)
     first = next(iter(tables))
@@ -87,13 +103,12 @@ def ensemble_result(study: EnsembleStudy, folder: Path) -> Result:
         f"{result.draws} draws completed",
         numbers=_numbers(study, tables),
         finding=_lead(study, tables),
-        next_step=_next_step(study),
+        next_step=_next_step(study, folder, beside),
         picture=Picture("answer", lambda: band_over_time(result, first), f"Band of {first} over time",
                         f"{first}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
         tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
-                      note=_of_mesh(study, tables)),),
-        sections=_sections(study, tables, figures, has_states=bool(fields) and bool(len(fields[0].invariants)),
-                           has_fields=has_fields),
+                      note=f"{_of_sector(study)} {_of_mesh(study, tables)}".strip()),),
+        sections=_sections(study, tables, fields, limits, has_fields=has_fields),
         warnings=tuple(study.warnings),
         files=_files(study, tables) | ({"fields.vtu": lambda path: write_fields(path, fields)} if has_fields else {}),
     )  # fmt: skip
@@ -103,23 +118,21 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
     """Return every quantity at the end with its band, and the largest share of the variance of the first."""
     percent, numbers = _headers(study, tables)[4], []
     for name, table in list(tables.items())[:MAX_NUMBERS]:
-        mean, _, low, high = _band(_last(table))
+        row = last_row(table)
+        mean, low, high = (row[f"{prefix_of(row)}{column}"] for column in ("mean", "low", "high"))
         numbers.append(Number(f"{name} at the end", mean, low, high, interval_is=f"{percent} band"))
-    row = _last(next(iter(tables.values())))
     first = next(iter(tables.values()))
-    shares = {name: row[name] for name in shares_in(first, is_shared=study.result.is_shared)}
-    if shares and all(np.isfinite(share) for share in shares.values()):
-        largest = max(shares, key=lambda name: shares[name])
-        share = f"{100 * shares[largest]:.0f} ± {100 * row[f'{largest}_error']:.0f} % of the variance"
-        numbers.append(Number("uncertain mostly by", LABELS[largest], remark=share))
-    return tuple(numbers)
+    return (*numbers, *largest_share(last_row(first), shares_in(first, is_shared=study.result.is_shared)))
 
 
-def _next_step(study: EnsembleStudy) -> str:
+def _next_step(study: EnsembleStudy, folder: Path, beside: Path) -> str:
     result = study.result
     if result.without_spread:
         names = ", ".join(result.without_spread)
         return f"see whether the model uses the material that was replaced: all draws give the same {names}."
+    run, first = next(iter(study.prepared.settings.materials.values())), next(iter(result.curves))
+    target = f"ensemble:{folder}" + f":{first}" * (len(result.curves) > 1)
+    design = f"tissuq design {shlex.quote(os.path.normpath(beside / run))} --target {shlex.quote(target)}"
     if result.failures:
         return (
             "look at why draws failed, below. To make them again, where the solver was at fault, repeat the command "
@@ -127,10 +140,10 @@ def _next_step(study: EnsembleStudy) -> str:
         )
     beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))
     if beyond is not None and beyond > MUCH_BEYOND:
-        return "measure up to the strains of the model: tissuq design RUN says which test helps most (RUN: the fit)"
+        return f"measure up to the strains of the model: {design} says which test helps most"
     if result.draws < FEW_DRAWS:
         return f"make the band more accurate: repeat the command with --draws {FEW_DRAWS} and another --out."
-    return "see which test would make the band narrower: tissuq design RUN (RUN: the fit)"
+    return f"see which test would make the band narrower: {design}"
 
 
 def readable_quantities(study: EnsembleStudy) -> tuple[list[str], list[list[str]]]:
@@ -138,7 +151,7 @@ def readable_quantities(study: EnsembleStudy) -> tuple[list[str], list[list[str]
     result = study.result
     tables = {name: result.table(name) for name in result.curves}
     headers = ["quantity", *_headers(study, tables)]
-    return headers, [[name, *_row(study, _last(table))] for name, table in tables.items()]
+    return headers, [[name, *_row(study, last_row(table))] for name, table in tables.items()]
 
 
 def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
@@ -162,7 +175,7 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
             "finer_model": _finer(study),
             "draws": result.draws,
             "failed": sum(failure.family == COMPLETE for failure in result.failures),
-            "quantities": {name: _plain(_last(table)) for name, table in tables.items()},
+            "quantities": {name: _plain(last_row(table)) for name, table in tables.items()},
             "measured_invariants": {name: list(ensemble.most) for name, ensemble in prepared.ensembles.items()},
             "elements_beyond": None if beyond is None else float(np.nanmean(beyond[1][:, -1])),
             "seconds": result.seconds,
@@ -223,17 +236,12 @@ def _curves(study: EnsembleStudy) -> xr.Dataset:
     return xr.Dataset(curves, coordinates, {"model": study.prepared.settings.model})
 
 
-def _last(table: pd.DataFrame) -> dict[str, Any]:
-    """Return the last row of a table with a band."""
-    return {str(key): value for key, value in table[table["draws"] > 1].iloc[-1].items()}
-
-
 def _plain(row: dict[str, Any]) -> dict[str, Any]:
     return {key: None if value != value else float(value) for key, value in row.items() if not key.startswith("noise")}
 
 
 def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]:
-    percent = f"{100 * band_probability(min(int(table['draws'].iloc[-1]) for table in tables.values())):.0f} %"
+    percent = percent_of(min(table["draws"].iloc[-1] for table in tables.values()))
     shares = shares_in(next(iter(tables.values())), is_shared=study.result.is_shared)
     first = next(iter(tables.values()))
     return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)] + (
@@ -242,28 +250,18 @@ def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]
 
 
 def _row(study: EnsembleStudy, row: dict[str, Any]) -> list[str]:
-    mean, sd, low, high = map(significant, _band(row))
-    cells = [f"{row['time']:.4g}", str(int(row["draws"])), mean, sd, f"{low} to {high}"]
-    for name in shares_in(row, is_shared=study.result.is_shared):
-        share, error = row[name], row[f"{name}_error"]
-        cells.append("" if np.isnan(share) else f"{100 * share:.0f} ± {100 * error:.0f} %")
+    cells = [f"{row['time']:.4g}", str(int(row["draws"])), *band_cells(row, prefix=prefix_of(row))]
+    cells += [share_cell(row, name) for name in shares_in(row, is_shared=study.result.is_shared)]
     return [*cells, *[significant(row["mean"])] * is_mesh_free(row)]
-
-
-def _band(row: dict[str, Any]) -> list[float]:
-    """Return mean, sd and ends of the band that is shown: that for cells without size, where there is one."""
-    return [row[f"{prefix_of(row)}{name}"] for name in ("mean", "sd", "low", "high")]
 
 
 def _of_mesh(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
     """Return what was done for the size of the elements, in sentences; nothing where nothing was."""
     finer = study.prepared.finer
-    corrected = {name: _last(table) for name, table in tables.items() if is_mesh_free(table)}
+    corrected = {name: last_row(table) for name, table in tables.items() if is_mesh_free(table)}
     if finer is None or not corrected:
         return ""
-    sizes = ", ".join(
-        f"{name} {100 * (row['mesh_free_mean'] / row['mean'] - 1):+.1f} %" for name, row in corrected.items()
-    )
+    sizes = ", ".join(f"{name} {mesh_change(row)}" for name, row in corrected.items())
     return (
         f"For elements without size (Richardson): at the end {sizes} beside this mesh, of which a quarter is taken as "
         f"the sd of its error, within the band. {finer.words}"
@@ -273,17 +271,15 @@ def _of_mesh(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
 def _sections(
     study: EnsembleStudy,
     tables: dict[str, pd.DataFrame],
-    figures: Callable[[], dict[str, Figure]],
+    fields: Sequence[FinalFields],
+    limits: tuple[tuple[str, tuple[float, float]], ...],
     *,
-    has_states: bool,
     has_fields: bool,
 ) -> tuple[Section, ...]:
     """Return what a page folds: every quantity, states of the material, failures, how it was computed."""
     prepared, result = study.prepared, study.result
     headers = _headers(study, tables)
-    sections = [
-        Section(f"{name} over time", _quantity(study, name, table, headers, figures)) for name, table in tables.items()
-    ]
+    sections = [Section(f"{name} over time", _quantity(study, name, table, headers)) for name, table in tables.items()]
     if shares_in(first := next(iter(tables.values())), is_shared=result.is_shared):
         sentences = (*[SHARES] * result.is_shared, *[of_sources(first)] * bool(result.sources))
         sentences += (OF_MESH,) * is_mesh_free(first)
@@ -294,9 +290,10 @@ def _sections(
         for name, ensemble in prepared.ensembles.items()
     ]  # fmt: skip
     columns = ["material", "data", "law", "discrepancy", "measured I1 − 3 up to", "I2 − 3 up to"]
-    states = Picture("states", lambda: figures()["states"], "Invariants of the elements against those measured", STATES)
-    asked: tuple[Block, ...] = (states,) if has_states else ()
-    asked += (Table(columns, materials, text_columns=(1, 2, 3)),)
+    asked: tuple[Block, ...] = (Table(columns, materials, text_columns=(1, 2, 3)),)
+    if fields and len(fields[0].invariants):
+        words = "Invariants of the elements against those measured"
+        asked = (Picture("states", lambda: state_figure(result, fields, limits), words, STATES), *asked)
     sections.append(Section("What the model asks of the material", asked))
     if result.failures:
         failures = tuple(
@@ -325,9 +322,7 @@ def _sections(
     return (*sections, Section("How it was computed", (computed, deck)))
 
 
-def _quantity(
-    study: EnsembleStudy, name: str, table: pd.DataFrame, headers: list[str], figures: Callable[[], dict[str, Figure]]
-) -> tuple[Block, ...]:
+def _quantity(study: EnsembleStudy, name: str, table: pd.DataFrame, headers: list[str]) -> tuple[Block, ...]:
     """Return definition, figure and some times of a quantity."""
     full = table[table["draws"] > 1]
     is_shared = bool(shares_in(table, is_shared=study.result.is_shared))
@@ -336,12 +331,28 @@ def _quantity(
     text = next(quantity.text for quantity in study.prepared.quantities if quantity.name == name)
     shares = " Right: shares of the variance, ± one standard error (bootstrap)." * is_shared
     figure = Picture(
-        f"quantity-{name}", lambda: figures()[f"quantity-{name}"], f"Band of {name} over time, and its values at the "
-        "end",
+        f"quantity-{name}",
+        lambda: quantity_figure(study.result, name),
+        f"Band of {name} over time, and its values at the end",
         f"Left: mean and {headers[4]} band over draws of the posterior, over the time of the model. "
         f"{'Middle' if is_shared else 'Right'}: the draws at its end.{shares}",
     )  # fmt: skip
     return f"{text}, in the units of the model", figure, Table(headers, rows)
+
+
+def _of_sector(study: EnsembleStudy) -> str:
+    """Return of what forces are where a program computes a part of an axisymmetric body; else nothing."""
+    prepared = study.prepared
+    deck, quantities = prepared.deck, prepared.quantities
+    has_forces = any(isinstance(quantity, Component) and quantity.kind == "RF" for quantity in quantities)
+    if not (has_forces and isinstance(prepared.solver, CalculiXSolver)):
+        return ""
+    if not deck.format.is_axisymmetric(list(deck.files.values())):
+        return ""
+    return (
+        f"Forces are of the sector of {360 // SECTORS_OF_RING} degrees that CalculiX computes of an axisymmetric body: "
+        f"those of the whole are {SECTORS_OF_RING} times as large."
+    )
 
 
 def _lead(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
@@ -349,7 +360,7 @@ def _lead(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
     percent = _headers(study, tables)[4]
     sentences = []
     for name, table in tables.items():
-        row = _last(table)
-        mean, _, low, high = map(significant, _band(row))
-        sentences.append(f"At time {row['time']:.4g}, {name} is {mean} ({percent}: {low} to {high}).")
+        row = last_row(table)
+        mean, _, ends = band_cells(row, prefix=prefix_of(row))
+        sentences.append(f"At time {row['time']:.4g}, {name} is {mean} ({percent}: {ends}).")
     return " ".join(sentences)

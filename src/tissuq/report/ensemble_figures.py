@@ -13,34 +13,21 @@ from tissuq.decks.calculix_results import CELL_TYPES
 from tissuq.decks.fields import FinalFields
 from tissuq.decks.model_ensemble import ModelEnsemble
 from tissuq.drawing import pieces
-from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
-from tissuq.finite_elements.spread import band_probability
-from tissuq.report.simulation_figures import SHARES as ALL_SHARES
-from tissuq.report.simulation_figures import draw_shares, mesh_ratio, prefix_of, shares_in
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
+from tissuq.report.band_table import SHARES as ALL_SHARES
+from tissuq.report.band_table import mesh_ratio, percent_of, prefix_of, shares_in
+from tissuq.report.simulation_figures import draw_shares
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["band_over_time", "ensemble_figures", "write_fields"]
+__all__ = ["band_over_time", "quantity_figure", "state_figure", "write_fields"]
 
 FloatArray = NDArray[np.float64]
 
 SHARES = {name: color for name, color in ALL_SHARES.items() if name != "noise"}
-
-
-def ensemble_figures(
-    ensemble: ModelEnsemble, fields: Sequence[FinalFields], limits: tuple[tuple[str, tuple[float, float]], ...]
-) -> dict[str, Figure]:
-    """Return the figures by name: one of every quantity, and that of the states where strains were written."""
-    from matplotlib import rc_context
-
-    with rc_context(STYLE):
-        figures = {f"quantity-{name}": _quantity(ensemble, name) for name in ensemble.curves}
-        if fields and len(fields[0].invariants):
-            figures["states"] = _states(ensemble, fields, limits)
-    return figures
 
 
 def band_over_time(ensemble: ModelEnsemble, name: str) -> Figure:
@@ -53,7 +40,7 @@ def band_over_time(ensemble: ModelEnsemble, name: str) -> Figure:
 
 def _draw_band(axis: Axes, table: pd.DataFrame, name: str) -> None:
     """Draw mean and band of a quantity over time; of a single time as an interval."""
-    time, percent = table["time"], f"{100 * band_probability(int(table['draws'].max())):.0f} %"
+    time, percent = table["time"], percent_of(table["draws"].max())
     is_path = len(table) > 1
     mean, low, high = (table[f"{prefix_of(table)}{column}"] for column in ("mean", "low", "high"))
     pieces.band(axis, time, low, high, strength=0.25, label=percent, is_path=is_path)
@@ -63,52 +50,49 @@ def _draw_band(axis: Axes, table: pd.DataFrame, name: str) -> None:
     axis.legend(fontsize=9)
 
 
-def _quantity(ensemble: ModelEnsemble, name: str) -> Figure:
+def quantity_figure(ensemble: ModelEnsemble, name: str) -> Figure:
     """Draw the band of a quantity over time, the last values, and the shares of the variance where there are any."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.6, 3.7))
-    table = ensemble.table(name)
-    has_shares = bool(shares_in(table, is_shared=ensemble.is_shared)) and len(ensemble.times[name]) > 1
-    axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
-    table = table[table["draws"] > 1]
-    _draw_band(axes[0], table, name)
-    last = ensemble.last_values(name) * mesh_ratio({str(key): value for key, value in table.iloc[-1].items()})
-    axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
-    axes[1].set_title(f"{name} at the end")
-    axes[1].set_ylabel("draws")
-    if has_shares:
-        draw_shares(axes[2], table["time"], table, SHARES)
-        axes[2].set_xlabel("time")
+    with new_figure(9.6, 3.7) as figure:
+        table = ensemble.table(name)
+        has_shares = bool(shares_in(table, is_shared=ensemble.is_shared)) and len(ensemble.times[name]) > 1
+        axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
+        table = table[table["draws"] > 1]
+        _draw_band(axes[0], table, name)
+        last = ensemble.last_values(name) * mesh_ratio({str(key): value for key, value in table.iloc[-1].items()})
+        axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
+        axes[1].set_title(f"{name} at the end")
+        axes[1].set_ylabel("draws")
+        if has_shares:
+            draw_shares(axes[2], table["time"], table, SHARES)
+            axes[2].set_xlabel("time")
     return figure
 
 
-def _states(
+def state_figure(
     ensemble: ModelEnsemble, fields: Sequence[FinalFields], limits: tuple[tuple[str, tuple[float, float]], ...]
 ) -> Figure:
     """Draw the states of the elements at the end, draws together, and what was measured of draw material."""
-    from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
-    figure = Figure(figsize=(9.6, 3.7))
-    axis, share_axis = figure.subplots(1, 2, width_ratios=(1.4, 1))
-    for index, (name, (max_1, max_2)) in enumerate(limits):
-        color = (BAND, TRUTH, BASE)[index % 3]
-        is_ours = fields[0].materials == name
-        states = np.concatenate([draw.invariants[is_ours] for draw in fields])
-        axis.plot(*states.T, ".", ms=2, color=color, alpha=0.3, label=name, rasterized=True)
-        axis.add_patch(Rectangle((0, 0), max_1, max_2, fill=False, ec=color, lw=1.5))
-    axis.set_xlabel("I1 - 3")
-    axis.set_ylabel("I2 - 3")
-    axis.set_title("Elements at the end; within the frame: measured")
-    axis.legend(fontsize=9, markerscale=5)
-    if ensemble.beyond is not None:
-        times, shares = ensemble.beyond
-        shown = np.isfinite(shares).any(axis=0)
-        share_axis.plot(times[shown], 100 * np.nanmean(shares[:, shown], axis=0), color=INK)
-        share_axis.set_title("Elements beyond it [%]")
-        share_axis.set_xlabel("time")
-        share_axis.set_ylim(0, 103)
+    with new_figure(9.6, 3.7) as figure:
+        axis, share_axis = figure.subplots(1, 2, width_ratios=(1.4, 1))
+        for index, (name, (max_1, max_2)) in enumerate(limits):
+            color = (BAND, TRUTH, BASE)[index % 3]
+            is_ours = fields[0].materials == name
+            states = np.concatenate([draw.invariants[is_ours] for draw in fields])
+            axis.plot(*states.T, ".", ms=2, color=color, alpha=0.3, label=name, rasterized=True)
+            axis.add_patch(Rectangle((0, 0), max_1, max_2, fill=False, ec=color, lw=1.5))
+        axis.set_xlabel("I1 - 3")
+        axis.set_ylabel("I2 - 3")
+        axis.set_title("Elements at the end; within the frame: measured")
+        axis.legend(fontsize=9, markerscale=5)
+        if ensemble.beyond is not None:
+            times, shares = ensemble.beyond
+            shown = np.isfinite(shares).any(axis=0)
+            share_axis.plot(times[shown], 100 * np.nanmean(shares[:, shown], axis=0), color=INK)
+            share_axis.set_title("Elements beyond it [%]")
+            share_axis.set_xlabel("time")
+            share_axis.set_ylim(0, 103)
     return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from math import isnan
@@ -110,7 +111,7 @@ def prediction_result(
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
         finding=_lead(prediction),
         uses=_use_of_mode(prediction, beside / settings.run),
-        next_step=_next_step(prediction),
+        next_step=_next_step(prediction, shlex.quote(os.path.normpath(beside / settings.run))),
         picture=Picture(
             "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
             f"Predicted bands of the stress in mode {prediction.mode.name}", _caption(prediction),
@@ -164,11 +165,11 @@ def _shares(prediction: Prediction) -> list[Number]:
     return numbers
 
 
-def _next_step(prediction: Prediction) -> str:
+def _next_step(prediction: Prediction, run: str) -> str:
     if not prediction.is_calibrated.all():
-        return "see which test would make the extrapolated stress less uncertain: tissuq design RUN (RUN: the fit)"
+        return f"see which test would make the extrapolated stress less uncertain: tissuq design {run}"
     if prediction.scores is None:
-        return "compare with a measurement of this mode, if there is one: tissuq predict RUN --data FILE (RUN: the fit)"
+        return f"compare with a measurement of this mode, if there is one: tissuq predict {run} --data FILE"
     return "see which laws describe all tests together: tissuq fit FILES --material LAW --material OTHER"
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,18 +14,28 @@ from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.simulation_figures import (
+from tissuq.report.band_table import (
     LABELS,
     SHARES,
-    force_figure,
+    band_cells,
     handy_unit,
     is_mesh_free,
+    largest_share,
+    last_row,
+    mesh_change,
     mesh_ratio,
     of_sources,
+    percent_of,
     prefix_of,
+    share_cell,
     shares_in,
-    simulation_figures,
+)
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.simulation_figures import (
+    field_figure,
+    force_and_strain_figure,
+    force_figure,
+    share_figure,
     write_collection,
     write_vtu,
 )
@@ -37,6 +48,7 @@ if TYPE_CHECKING:
 
 __all__ = ["readable_forces", "simulation_result"]
 
+OF_MEASUREMENT = "the variance of a new measurement, whose noise is not in the band"
 MUCH_BEYOND = 0.2
 """Share of the strain energy beyond the measurements from which these are to be extended."""
 CELL_FIELDS = {
@@ -47,18 +59,18 @@ CELL_FIELDS = {
 }
 
 
-def simulation_result(study: SimulationStudy, folder: Path) -> Result:
-    """Return what a simulation says; its folder holds the results of the draws and the recipe."""
+def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result:
+    """Return what a simulation with draws of a run says; its folder holds the results of the draws and the recipe."""
     simulation, model = study.simulation, study.posteriors.fitted.model
     table = simulation.table()
     (folder / "failures.csv").unlink(missing_ok=True)
     failures = [vars(failure) for failure in simulation.failures]
     case = simulation.case
     headers, rows = readable_forces(study)
-    percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
+    percent = percent_of(table["draws"].max())
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     caption = (
-        f"{case.response.capitalize()} over {case.travel_name}: mean and {percent} % band over draws of the posterior, "
+        f"{case.response.capitalize()} over {case.travel_name}: mean and {percent} band over draws of the posterior, "
         f"without the noise of a measurement{against}.{_of_cells(simulation, table)}"
     )
     titled = f"Case '{case.name}' with {study.settings.draws} draws"
@@ -75,7 +87,7 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
         f"{model.discrepancy.name} · {_completed(simulation)}",
         numbers=_numbers(study, table),
         finding=_lead(simulation, table),
-        next_step=_next_step(simulation),
+        next_step=_next_step(simulation, shlex.quote(os.path.normpath(run))),
         picture=Picture("answer", lambda: force_figure(simulation, table), f"Band of the {case.response}", caption),
         tables=(Table(headers, rows, titled, note=_of_cells(simulation, table).strip()),),
         sections=_sections(study, table),
@@ -100,46 +112,41 @@ def _of_cells(simulation: Simulation, table: pd.DataFrame) -> str:
     """Return what was done for the size of the cells, as a sentence after others; nothing where nothing was."""
     if not is_mesh_free(table):
         return ""
-    last = _last_step(table)
-    change = 100 * (last["mesh_free_mean"] / last["mean"] - 1)
     return (
         f" For cells without size (Richardson, from {simulation.finer_mesh}, the error falling with the power "
-        f"{simulation.mesh_order:g} of their size): at the end {change:+.1f} % beside "
+        f"{simulation.mesh_order:g} of their size): at the end {mesh_change(last_row(table))} beside "
         "this mesh, of which a quarter is taken as the sd of its error, within the band."
     )
 
 
 def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     """Return the force at the last step, the largest share of its variance, and how much of the body extrapolates."""
-    simulation, last = study.simulation, _last_step(table)
+    simulation, last = study.simulation, last_row(table)
     unit, factor = handy_unit(table, simulation.case.response_unit)
-    percent = f"{100 * band_probability(int(last['draws'])):.0f} % band"
     mean, low, high = (last[f"{prefix_of(table)}{name}"] * factor for name in ("mean", "low", "high"))
     case = simulation.case
     at = f"{case.response} at {case.travel_name} {case.shown(last[case.travel_column])}"
-    numbers = [Number(at, mean, low, high, unit, percent)]
-    shares = {name: last[name] for name in SHARES if name in last and np.isfinite(last[name])}
-    if len(shares) > 1:
-        largest = max(shares, key=lambda name: shares[name])
-        share = f"{_percent(shares[largest], last[f'{largest}_error'])} of the variance"
-        numbers.append(Number("uncertain mostly by", LABELS[largest], remark=share))
+    numbers = [
+        Number(at, mean, low, high, unit, f"{percent_of(last['draws'])} band"),
+        *largest_share(last, [name for name in SHARES if name in last], OF_MEASUREMENT),
+    ]
     beyond = _last_mean(simulation.energy_beyond)
     if beyond is not None:
         numbers.append(Number("energy strained beyond the measurements", f"{100 * beyond:.0f} %"))
     return tuple(numbers)
 
 
-def _next_step(simulation: Simulation) -> str:
+def _next_step(simulation: Simulation, run: str) -> str:
     if (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
-        return "measure up to the strains of the body: tissuq design RUN says which test helps most (RUN: the fit)"
-    return "run your own model with the same draws: tissuq ensemble RUN MODEL --replace NAME --qoi NAME=WHAT"
+        return f"measure up to the strains of the body: tissuq design {run} says which test helps most"
+    return f"run your own model with the same draws: tissuq ensemble {run} MODEL --replace NAME --qoi NAME=WHAT"
 
 
 def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]:
     """Return headers and rows of the forces as text."""
     simulation, table = study.simulation, study.simulation.table()
     unit, factor = handy_unit(table, simulation.case.response_unit)
-    percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
+    percent = percent_of(table["draws"].max())
     is_compared = WITHOUT in simulation.forces
     shares = [*shares_in(table, is_shared=MATERIAL_ONLY in simulation.forces), "noise"]
     case = simulation.case
@@ -151,22 +158,13 @@ def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]
     rows = []
     for row in table.to_dict("records"):
         numbers = {str(key): value for key, value in row.items()}
-        cells = [f"{row[case.travel_column]:.3g}", str(row["draws"]), *_band(numbers, factor, prefix)]
-        cells += [_percent(numbers[name], numbers[f"{name}_error"]) for name in shares]
+        cells = [f"{row[case.travel_column]:.3g}", str(row["draws"]), *band_cells(numbers, factor, prefix)]
+        cells += [share_cell(numbers, name) for name in shares]
         if is_compared:
-            mean, _, ends = _band(numbers, factor * mesh_ratio(numbers), "without_")
+            mean, _, ends = band_cells(numbers, factor * mesh_ratio(numbers), "without_")
             cells += [mean, ends]
         rows.append([*cells, *[significant(numbers["mean"] * factor)] * bool(prefix)])
     return headers, rows
-
-
-def _band(row: dict[str, Any], factor: float, prefix: str) -> list[str]:
-    mean, sd, low, high = (row.get(f"{prefix}{name}", np.nan) * factor for name in ("mean", "sd", "low", "high"))
-    return [significant(mean), significant(sd), f"{significant(low)} to {significant(high)}"]
-
-
-def _percent(value: float, error: float) -> str:
-    return "" if np.isnan(value) else f"{100 * value:.0f} ± {100 * error:.0f} %"
 
 
 def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
@@ -254,22 +252,21 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
     simulation, settings = study.simulation, study.settings
     unit, factor = handy_unit(table, simulation.case.response_unit)
     case, draws = simulation.case, len(simulation.forces[COMPLETE])
-    figures = cache(lambda: simulation_figures(simulation, table))
     noise = f"{significant(simulation.noise_sd * factor)} {unit}"
     origin = f"the same share of the largest {case.response} as the test's noise is of its largest stress"
-    percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
+    percent = percent_of(table["draws"].max())
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     forces = Picture(
-        "forces", lambda: figures()["forces"],
+        "forces", lambda: force_and_strain_figure(simulation, table),
         f"Band of the {case.response}, and what is strained beyond the measurements",
-        f"Left: {case.response} over {case.travel_name}: mean and {percent} % band over draws of the posterior, "
+        f"Left: {case.response} over {case.travel_name}: mean and {percent} band over draws of the posterior, "
         f"without the noise of a measurement{against}.{_of_cells(simulation, table)} Right: how much of the body "
         "is strained beyond the measured I1 or I2, and how much of the strain energy is there.",
     )  # fmt: skip
     sections = [Section("What is strained beyond the measurements", (forces,))]
     if MATERIAL_ONLY in simulation.forces:
         shares = Picture(
-            "shares", lambda: figures()["shares"], "Shares of the variance, and standard deviations",
+            "shares", lambda: share_figure(simulation, table), "Shares of the variance, and standard deviations",
             f"Left: shares of the variance of a new measurement of the {case.response}; shaded, ± one standard error "
             f"of {draws} draws (bootstrap). Right: how much the {case.response} would spread by each part alone; where "
             "the total is less than its parts, they compensate each other.",
@@ -294,8 +291,9 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         sections.append(Section("Sources of uncertainty", (words,)))
     if len(simulation.fields.get("largest", ())) > 1 and len(simulation.case.mesh().section[0]):
         fields = Picture(
-            "fields", lambda: figures()["fields"], "Deformed section with mean and standard deviation of the largest "
-            "stretch",
+            "fields",
+            lambda: field_figure(simulation),
+            "Deformed section with mean and standard deviation of the largest stretch",
             f"{case.mesh().section_is}, deformed by the mean displacement at the last step. fields.vtu and "
             "middle_draw.pvd hold the fields for ParaView.",
         )  # fmt: skip
@@ -362,19 +360,14 @@ def _size(name: str, value: float | str | dict[str, str], unit: str) -> str:
 def _lead(simulation: Simulation, table: pd.DataFrame) -> str:
     """Return the finding in a sentence or two."""
     unit, factor = handy_unit(table, simulation.case.response_unit)
-    last_step = _last_step(table)
-    mean, _, ends = _band(last_step, factor, prefix_of(table))
-    percent = f"{100 * band_probability(int(last_step['draws'])):.0f} %"
+    last_step = last_row(table)
+    mean, _, ends = band_cells(last_step, factor, prefix_of(table))
+    percent = percent_of(last_step["draws"])
     case = simulation.case
     article, travel = "an" if case.travel_name[0] in "aeiou" else "a", case.shown(last_step[case.travel_column])
     text = f"At {article} {case.travel_name} of {travel} the {case.response} is {mean} {unit}"
     text += f" ({percent}: {ends} {unit})."
     if WITHOUT in simulation.forces:
-        without, _, without_ends = _band(last_step, factor * mesh_ratio(last_step), "without_")
+        without, _, without_ends = band_cells(last_step, factor * mesh_ratio(last_step), "without_")
         text += f" Without discrepancy it is {without} {unit} ({without_ends} {unit})."
     return text
-
-
-def _last_step(table: pd.DataFrame) -> dict[str, Any]:
-    """Return the last row with a band."""
-    return {str(name): value for name, value in table[table["draws"] > 1].iloc[-1].items()}

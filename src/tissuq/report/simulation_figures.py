@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
 from io import StringIO
 from pathlib import Path
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.drawing import pieces
-from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, SERIES, STYLE, TRUTH, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
 from tissuq.finite_elements.case import ACROSS, AXIAL, Mesh
 from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
-from tissuq.finite_elements.spread import band_probability
+from tissuq.report.band_table import LABELS, SHARES, handy_unit, is_mesh_free, percent_of, prefix_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,94 +24,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "LABELS",
-    "SHARES",
     "draw_shares",
+    "field_figure",
+    "force_and_strain_figure",
     "force_figure",
-    "handy_unit",
-    "is_mesh_free",
-    "mesh_ratio",
-    "of_sources",
-    "prefix_of",
-    "shares_in",
-    "simulation_figures",
+    "share_figure",
     "write_collection",
     "write_vtu",
 ]
 
 FloatArray = NDArray[np.float64]
 
-UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
-SHARES = {
-    "parameters": BAND, "discrepancy": TRUTH, "extrapolation": SERIES[2], "test_scale": SERIES[3], "mesh": SERIES[4],
-    "noise": BASE,
-}  # fmt: skip
-"""Colours of what a variance is due to."""
-LABELS = {name: name for name in SHARES} | {"test_scale": "scale of tests"}
-OF_SOURCES = (
-    "What draws differ by independently of these is taken out first: **extrapolation**, how they go on beyond the "
-    "measured range, and the **scale of tests**, the factor that all tests have in common (area, load cell; of a "
-    "tissue the difference between specimens, too)."
-)
-IN_THE_OTHERS = (
-    "How draws go on beyond the measured range, and the factor that all tests have in common, are within these shares: "
-    "it takes more draws to tell them apart."
-)
 MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
-
-
-def handy_unit(table: pd.DataFrame, unit: str) -> tuple[str, float]:
-    """Return the unit in which the largest mean is a handy number, and how many of it are one of the given ones."""
-    largest = float(table["mean"].abs().max())
-    return next((pair for pair in UNITS[unit] if largest * pair[1] >= 1), UNITS[unit][-1])
-
-
-def is_mesh_free(table: Collection[str] | pd.DataFrame) -> bool:
-    """Return whether there are bands for cells without size."""
-    return "mesh_free_mean" in table
-
-
-def prefix_of(table: Collection[str] | pd.DataFrame) -> str:
-    """Return what the columns of the band begin with that is shown: that for cells without size, where there is one."""
-    return "mesh_free_" if is_mesh_free(table) else ""
-
-
-def mesh_ratio(row: Mapping[str, Any]) -> float:
-    """Return what a force on the mesh is multiplied with for cells without size; 1 where that is not known."""
-    return float(row["mesh_free_mean"] / row["mean"]) if "mesh_free_mean" in row else 1.0
-
-
-def shares_in(table: Collection[str] | pd.DataFrame, *, is_shared: bool) -> list[str]:
-    """Return the sources of variance that a table, or a row of one, has shares of, where there are several."""
-    sources = [name for name in SHARES if name in table and name != "noise"]
-    return sources if is_shared or len({*sources} - {"mesh"}) > 2 else []
-
-
-def of_sources(table: pd.DataFrame) -> str:
-    """Return what is said of sources that draws have besides parameters and discrepancy."""
-    return IN_THE_OTHERS if {"extrapolation", "test_scale"}.isdisjoint(table.columns) else OF_SOURCES
-
-
-def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str, Figure]:
-    """Return the figures by name; that of the shares where there is a discrepancy, that of fields where any draw ended.
-
-    Parameters
-    ----------
-    found : Simulation
-    table : pandas.DataFrame
-        Of `Simulation.table`.
-    """
-    from matplotlib import rc_context
-
-    table_of_bands = table[table["draws"] > 1]
-    with rc_context(STYLE):
-        figures = {"forces": _forces(simulation, table_of_bands)}
-        if MATERIAL_ONLY in simulation.forces:
-            figures["shares"] = _shares(simulation, table_of_bands)
-        if len(simulation.fields.get("largest", ())) > 1 and len(simulation.case.mesh().section[0]):
-            figures["fields"] = _fields(simulation)
-    return figures
 
 
 def force_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
@@ -124,7 +49,7 @@ def force_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
 def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> None:
     unit, factor = handy_unit(table, simulation.case.response_unit)
     travel = _from_zero(table[simulation.case.travel_column])
-    percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
+    percent = percent_of(table["draws"].max())
     bands = [
         (prefix_of(table), "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)
     ]
@@ -142,29 +67,27 @@ def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> Non
     axis.legend(fontsize=9)
 
 
-def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
+def force_and_strain_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
     """Draw the bands of the force, and beside them what of the body is strained beyond the measurements."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.6, 3.9))
-    axis, share_axis = figure.subplots(1, 2, width_ratios=(1.75, 1))
-    _draw_forces(axis, simulation, table)
-    for rows, label, color in (
-        (simulation.energy_beyond, "of the strain energy", INK), (simulation.volume_beyond, "of the volume", BASE),
-    ):  # fmt: skip
-        shown = np.isfinite(rows).any(axis=0)
-        share_axis.plot(
-            _from_zero(simulation.travel[shown]),
-            100 * _from_zero(np.nanmean(rows[:, shown], axis=0)),
-            color=color,
-            label=label,
-        )
-    share_axis.set_title("Strained beyond the measured range")
-    share_axis.set_ylabel("mean share [%]")
-    share_axis.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
-    share_axis.set_xlim(0, simulation.case.travel)
-    share_axis.set_ylim(0, 103)
-    share_axis.legend(fontsize=9)
+    with new_figure(9.6, 3.9) as figure:
+        axis, share_axis = figure.subplots(1, 2, width_ratios=(1.75, 1))
+        _draw_forces(axis, simulation, table[table["draws"] > 1])
+        for rows, label, color in (
+            (simulation.energy_beyond, "of the strain energy", INK), (simulation.volume_beyond, "of the volume", BASE),
+        ):  # fmt: skip
+            shown = np.isfinite(rows).any(axis=0)
+            share_axis.plot(
+                _from_zero(simulation.travel[shown]),
+                100 * _from_zero(np.nanmean(rows[:, shown], axis=0)),
+                color=color,
+                label=label,
+            )
+        share_axis.set_title("Strained beyond the measured range")
+        share_axis.set_ylabel("mean share [%]")
+        share_axis.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
+        share_axis.set_xlim(0, simulation.case.travel)
+        share_axis.set_ylim(0, 103)
+        share_axis.legend(fontsize=9)
     return figure
 
 
@@ -172,29 +95,28 @@ def _from_zero(values: Any) -> FloatArray:
     return np.concatenate([[0.0], np.asarray(values, dtype=np.float64)])
 
 
-def _shares(simulation: Simulation, table: pd.DataFrame) -> Figure:
+def share_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
     """Draw the shares of the variance, and the standard deviations of the parts that they are made of."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.6, 3.9))
-    axis, sd_axis = figure.subplots(1, 2)
-    travel = table[simulation.case.travel_column].to_numpy()
-    draw_shares(axis, travel, table, SHARES)
-    unit, factor = handy_unit(table, simulation.case.response_unit)
-    sizes = {
-        f"{simulation.case.response} of a draw": (table["sd"], INK, "-"),
-        "of its parameters alone": (table["alone_sd"], BAND, "--"),
-        "what the discrepancy adds": (table["discrepancy_sd"], TRUTH, "--"),
-        "noise": (np.full(len(travel), simulation.noise_sd), BASE, "--"),
-    }
-    for label, (sd, color, line) in sizes.items():
-        sd_axis.plot(travel, factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
-    sd_axis.set_title(f"Standard deviation between draws [{unit}]")
-    sd_axis.set_ylim(0)
-    for panel in (axis, sd_axis):
-        panel.set_xlim(0, simulation.case.travel * 1.02)
-        panel.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
-        panel.legend(fontsize=9)
+    with new_figure(9.6, 3.9) as figure:
+        axis, sd_axis = figure.subplots(1, 2)
+        table = table[table["draws"] > 1]
+        travel = table[simulation.case.travel_column].to_numpy()
+        draw_shares(axis, travel, table, SHARES)
+        unit, factor = handy_unit(table, simulation.case.response_unit)
+        sizes = {
+            f"{simulation.case.response} of a draw": (table["sd"], INK, "-"),
+            "of its parameters alone": (table["alone_sd"], BAND, "--"),
+            "what the discrepancy adds": (table["discrepancy_sd"], TRUTH, "--"),
+            "noise": (np.full(len(travel), simulation.noise_sd), BASE, "--"),
+        }
+        for label, (sd, color, line) in sizes.items():
+            sd_axis.plot(travel, factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
+        sd_axis.set_title(f"Standard deviation between draws [{unit}]")
+        sd_axis.set_ylim(0)
+        for panel in (axis, sd_axis):
+            panel.set_xlim(0, simulation.case.travel * 1.02)
+            panel.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
+            panel.legend(fontsize=9)
     return figure
 
 
@@ -211,10 +133,8 @@ def draw_shares(axis: Axes, along: Any, table: pd.DataFrame, colors: Mapping[str
     axis.legend(fontsize=9)
 
 
-def _fields(simulation: Simulation) -> Figure:
+def field_figure(simulation: Simulation) -> Figure:
     """Draw mean and sd of the largest stretch on the mean deformed section."""
-    from matplotlib.figure import Figure
-
     mesh = simulation.case.mesh()
     faces, cells = mesh.section
     largest = simulation.fields["largest"][:, cells]
@@ -222,18 +142,18 @@ def _fields(simulation: Simulation) -> Figure:
     corners = deformed[faces, :2]
     limits = _limits(corners, largest.mean(axis=0) - 1, mesh.is_half)
     height = 3.8 * min(1.1, max(0.3, limits[3] - limits[2]) / (limits[1] - limits[0])) + 1.3
-    figure = Figure(figsize=(10.4, height))
-    for axis, values, title, colors in zip(
-        figure.subplots(1, 2), (largest.mean(axis=0), largest.std(axis=0, ddof=1)),
-        ("Largest principal stretch: mean of the draws", "and its standard deviation between draws"),
-        ("viridis", "magma"), strict=True,
-    ):  # fmt: skip
-        _draw_section(axis, corners, values, colors, figure, mesh.is_half)
-        axis.set_title(title)
-        axis.set_xlim(limits[0], limits[1])
-        axis.set_ylim(limits[2], limits[3])
-        axis.set_xlabel("distance from the axis [mm]" if mesh.is_half else "across the axis [mm]")
-    figure.axes[0].set_ylabel("along the axis [mm]")
+    with new_figure(10.4, height) as figure:
+        for axis, values, title, colors in zip(
+            figure.subplots(1, 2), (largest.mean(axis=0), largest.std(axis=0, ddof=1)),
+            ("Largest principal stretch: mean of the draws", "and its standard deviation between draws"),
+            ("viridis", "magma"), strict=True,
+        ):  # fmt: skip
+            _draw_section(axis, corners, values, colors, figure, mesh.is_half)
+            axis.set_title(title)
+            axis.set_xlim(limits[0], limits[1])
+            axis.set_ylim(limits[2], limits[3])
+            axis.set_xlabel("distance from the axis [mm]" if mesh.is_half else "across the axis [mm]")
+        figure.axes[0].set_ylabel("along the axis [mm]")
     return figure
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tissuq.drawing.panels import legend_above
-from tissuq.drawing.style import STYLE
 from tissuq.report.coverage import numbers_of_shares
 from tissuq.report.coverage_figures import dots_by_row, panel_grid, shares_figure
 from tissuq.report.result import Picture, Result, Section, Table
@@ -167,12 +166,9 @@ def _plain(result: dict[str, Any]) -> dict[str, Any]:
 
 def _figure(summary: pd.DataFrame) -> Figure:
     """Draw coverage, half width and error by class of tissue, a row of panels a protocol."""
-    from matplotlib import rc_context
-
     protocols = list(dict.fromkeys(summary["protocol"]))
     classes = list(dict.fromkeys(summary["class"]))
-    with rc_context(STYLE):
-        figure, axes = panel_grid(len(protocols), len(PANELS), 0.8 + 0.26 * len(classes))
+    with panel_grid(len(protocols), len(PANELS), 0.8 + 0.26 * len(classes)) as (figure, axes):
         for row, protocol in zip(axes, protocols, strict=True):
             table = summary[summary["protocol"] == protocol]
             for axis, (measure, (_, target)) in zip(row, PANELS.items(), strict=True):

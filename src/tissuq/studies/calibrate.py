@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, fields
 from functools import partial
-from itertools import chain, count
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -27,7 +27,7 @@ from tissuq.emulation.runs import FIRST_RUNS, ForwardRun, ForwardRuns, carry_out
 from tissuq.errors import InputError
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.parameters.priors import Prior
-from tissuq.studies.stream import RESULTS, Step, open_pool, run_tasks, silent
+from tissuq.studies.stream import RESULTS, Step, forget_results, open_pool, read_results, run_tasks, silent
 
 __all__ = ["calibrate", "runs_of"]
 
@@ -200,7 +200,7 @@ class _Runs:
         batch_folder = self.folder / f"batch-{batch}"
         batch_folder.mkdir(exist_ok=True)
         is_begun = (batch_folder / RESULTS).exists()
-        _forget_failures(batch_folder / RESULTS)
+        forget_results(batch_folder / RESULTS, _has_failed)
         run = partial(run_tasks, carry_out=carry_out, folder=batch_folder, pool=self.pool)
         first = [] if batch else tasks[: self.first]
         if first:
@@ -262,24 +262,13 @@ def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:
             parent.rmdir()
 
 
-def _forget_failures(results: Path) -> None:
-    """Take failed runs off the disk, so that they are tried again."""
-    if not results.exists():
-        return
-    successes = [line for line in results.read_bytes().splitlines(keepends=True) if not _has_failed(line)]
-    results.write_bytes(b"".join(successes))
-
-
 def _have_all_failed(folder: Path) -> bool:
-    results = [path.read_bytes().splitlines() for path in folder.glob(f"batch-*/{RESULTS}")]
-    return any(results) and all(map(_has_failed, chain(*results)))
+    results = [result for path in folder.glob(f"batch-*/{RESULTS}") for result in read_results(path).values()]
+    return bool(results) and all(map(_has_failed, results))
 
 
-def _has_failed(line: bytes) -> bool:
-    try:
-        return bool(json.loads(line)["error"])
-    except (ValueError, KeyError, TypeError):  # cut short by a kill, or damaged
-        return True
+def _has_failed(result: dict[str, Any]) -> bool:
+    return bool(result.get("error", True))
 
 
 def _check_travels(model: Forward) -> None:

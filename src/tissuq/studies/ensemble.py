@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+import re
+import shutil
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -24,14 +26,19 @@ from tissuq.finite_elements.simulation import COMPLETE, FINE_MESH, MATERIAL_ONLY
 from tissuq.mechanics import Material
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.studies.earlier_run import load
-from tissuq.studies.ensemble_files import DRAWS
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.finer_model import FINER, FinerModel, finer_model
-from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
+from tissuq.studies.stream import RESULTS, Step, forget_results, read_results, run_tasks, silent
 
 __all__ = [
-    "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "drawn_materials", "prepare_ensemble", "run_ensemble",
+    "DRAWS", "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "drawn_materials", "forget_failures",
+    "prepare_ensemble", "run_ensemble",
 ]  # fmt: skip
+
+DRAWS = "draws"
+"""Folder with a folder for each run."""
+RUN_FOLDER = re.compile(r"[a-z]+-[0-9]+")
+"""What folders of runs are called."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +181,7 @@ def prepare_ensemble(
             cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
     _check_names(quantities, ensembles)
     _check_functions(quantities)
-    check_sets(deck, quantities)
+    check_sets(deck, quantities, solver)
     sets_of(deck, quantities)
     finer = finer_model(settings, beside, deck, quantities, ensembles.values())
     prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards, finer)
@@ -200,6 +207,16 @@ def drawn_materials(
         # Materials of different runs are independent: draws that are spread alike are paired at random.
         ensembles[name] = ensemble.shuffled([settings.seed, number]) if number else ensemble
     return ensembles
+
+
+def forget_failures(runs: Sequence[ModelRun], folder: Path) -> None:
+    """Take the results of runs that failed off the file of results, and their folders away."""
+    places = {run.key: run.folder.name for run in runs}
+    failed = forget_results(folder / RESULTS, lambda result: bool(result.get("problem") or result.get("misread")))
+    for key, result in failed.items():
+        name = places.get(key) or str(result.get("folder", ""))  # the latter where quantities are others
+        if RUN_FOLDER.fullmatch(name):
+            shutil.rmtree(folder / DRAWS / name, ignore_errors=True)
 
 
 def run_ensemble(

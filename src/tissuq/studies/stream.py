@@ -30,7 +30,17 @@ from typing import Any, Generic, ParamSpec, Protocol, TypeVar
 from tissuq.errors import InputError
 from tissuq.studies.batch_jobs import is_queue, workers_in_queue
 
-__all__ = ["RESULTS", "Campaign", "Step", "WorkerProcesses", "open_pool", "read_results", "run_tasks", "silent"]
+__all__ = [
+    "RESULTS",
+    "Campaign",
+    "Step",
+    "WorkerProcesses",
+    "forget_results",
+    "open_pool",
+    "read_results",
+    "run_tasks",
+    "silent",
+]
 
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
@@ -248,9 +258,7 @@ def run_tasks(
             step(task.label, True)
     results = [done[task.key] for task in tasks]
     if not others_stay:
-        scratch = path.with_suffix(".new")
-        scratch.write_text("".join(json.dumps(result_row) + "\n" for result_row in results), encoding="utf-8")
-        scratch.replace(path)
+        _write_results(path, results)
     return results
 
 
@@ -290,6 +298,22 @@ def read_results(path: Path) -> dict[str, dict[str, Any]]:
             file.truncate(len(complete))
     results = (_parsed(line) for line in complete.splitlines())
     return {result["key"]: result for result in results if result is not None}
+
+
+def forget_results(path: Path, has_failed: Callable[[dict[str, Any]], bool]) -> dict[str, dict[str, Any]]:
+    """Take the results of tasks that failed off a file, so that they are carried out again; return them by key."""
+    results = read_results(path)
+    failed = {key: result for key, result in results.items() if has_failed(result)}
+    if failed:
+        _write_results(path, [result for key, result in results.items() if key not in failed])
+    return failed
+
+
+def _write_results(path: Path, results: Sequence[dict[str, Any]]) -> None:
+    """Write a file of results, whole or not at all."""
+    scratch = path.with_suffix(".new")
+    scratch.write_text("".join(json.dumps(result) + "\n" for result in results), encoding="utf-8")
+    scratch.replace(path)
 
 
 def _parsed(line: bytes) -> dict[str, Any] | None:
