@@ -9,6 +9,8 @@ from scipy.stats import norm
 import tissuq as tq
 from against import BOXES, assert_agrees, both, neo_hookean, parts
 from dense import Linear
+from tissuq.inference.enumerators import adaptive_cells
+from tissuq.inference.reduction import _Fit, _of_independent_errors, _reduced
 from tissuq.model.statistical_model import StatisticalModel
 
 STRETCH = np.linspace(0.7, 2.0, 12)
@@ -127,3 +129,26 @@ def test_a_log_normal_prior_of_a_modulus_is_integrated_beside_the_others():
     assert posterior.solution.marginals["C10"].mean == pytest.approx(mean, abs=1e-3 * sd)
     assert posterior.solution.marginals["C10"].sd == pytest.approx(sd, rel=1e-3)
     assert posterior.model.nonlinear == ("C10", "S")
+
+
+@pytest.mark.parametrize("terms", [1, 2])
+def test_designs_are_reduced_at_once_as_one_by_one(terms):
+    found = model(OGDEN[f"ogden-{terms}"], noise="unknown")
+    other = StatisticalModel(
+        tq.Experiment("uniaxial", STRETCH, 1.1 * DATA.stress), found.material, found.discrepancy, "unknown"
+    )
+    settings = np.random.default_rng(0).uniform(1, 6, (5, terms))
+    designs = np.array([found.rows(found.basis(found.states, setting)) for setting in settings])
+    at_once = _of_independent_errors([found, other], designs)
+    for reduction, design in zip(at_once, designs, strict=True):
+        (alone,) = _reduced(found, _Fit.of([found, other], design), [()])
+        for name, values in vars(alone).items():
+            np.testing.assert_allclose(getattr(reduction, name), values, rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+def test_of_models_with_several_noises_one_is_checked_for_missed_mass(monkeypatch):
+    looked: list[int] = []
+    monkeypatch.setattr(adaptive_cells, "has_missed", lambda *_: bool(looked.append(1)))
+    posterior = tq.fit(DATA, material="ogden-2", discrepancy="none", tolerances={"stress": 0.05})
+    assert "the noise integrated over" in posterior.solution.reason
+    assert len(looked) <= 2  # of the noise grid, and of the fit from which its errors are estimated

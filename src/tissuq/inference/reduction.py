@@ -204,11 +204,14 @@ class Reducer:
         """Reduce at settings of the structure; at many at once where the data are few."""
         model = self._models[0]
         n, bent = model.experiment.size, len(model.bent_symbols)
+        is_plain = not model.is_correlated and not model.noise.depends_on_level
+        if bent and is_plain:
+            blocks_of_designs = _designs(model, settings)
+            return [one for block in blocks_of_designs for one in _of_independent_errors(self._models, block)]
         if bent:
-            fits = (_Fit.of(self._models, design) for design in _designs(model, settings))
+            fits = (_Fit.of(self._models, design) for block in _designs(model, settings) for design in block)
             pairs = zip(fits, settings, strict=True)
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
-        is_plain = not model.is_correlated and not model.noise.depends_on_level
         if is_plain and (len(self._models) == 1 or n > CHUNK):
             return [_from_statistics(self._models)]
         together = len(settings) if n <= FEW_POINTS else 1
@@ -217,12 +220,12 @@ class Reducer:
 
 
 def _designs(model: StatisticalModel, settings: Sequence[tuple[float, ...]]) -> Iterator[FloatArray]:
-    """Yield `design_at` at the first values of settings, as many at once as their stresses are computed directly."""
+    """Yield the designs (K, n, k) at the first values of settings, as many as their stresses are computed at once."""
     bent = np.array([setting[: len(model.bent_symbols)] for setting in settings])
     together = max(1, MAX_COMPLEX_STEP_VALUES // (len(model.states) * len(model.column_symbols)))
     for start in range(0, len(bent), together):
         bases = model.basis(model.states, bent[start : start + together])
-        yield from (np.asarray(model.rows(basis)) for basis in bases)
+        yield np.array([model.rows(basis) for basis in bases])
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +281,26 @@ def _from_statistics(models: Sequence[StatisticalModel]) -> Reduction:
         0 * single,
         0 * single,
     )
+
+
+def _of_independent_errors(models: Sequence[StatisticalModel], designs: FloatArray) -> list[Reduction]:
+    """Reduce at designs (K, n, k), all at once, where all errors have one variance."""
+    free, fixed = divided_columns(models[0])
+    basis, triangle = np.linalg.qr(designs[:, :, free])
+    inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
+    stresses = np.array([model.stress for model in models])
+    centre = stresses @ basis @ inverse.swapaxes(1, 2)
+    residual = stresses - centre @ designs[:, :, free].swapaxes(1, 2)
+    shared = np.concatenate([basis, designs[:, :, fixed]], axis=2)
+    wide = np.broadcast_to(shared[:, None], (len(designs), len(models), *shared.shape[1:]))
+    columns = np.concatenate([wide, residual[..., None]], axis=3)
+    squares = (columns.swapaxes(2, 3) @ columns).reshape(*residual.shape[:2], 1, -1)
+    log_size = np.log(np.abs(np.diagonal(triangle, 0, 1, 2))).sum(axis=1)
+    counts, zero = np.array([float(models[0].experiment.size)]), np.zeros(1)
+    return [
+        Reduction(inverse[index], float(log_size[index]), centre[index], squares[index], counts, zero, zero)
+        for index in range(len(designs))
+    ]
 
 
 def _reduced(model: StatisticalModel, fit: _Fit, shapes: Sequence[tuple[float, ...]]) -> list[Reduction]:

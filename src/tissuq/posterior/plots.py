@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ from tissuq.pictures.stability import stability
 
 __all__ = ["ROW", "PosteriorPlots", "plot_compare"]
 
+LETTERS_OF_NAME = 24
+"""In a line of the name of a fit that is compared."""
 SMALL_PANEL, ROW = 1.25, 0.32
 """Heights of a panel with a density, and of a row of a comparison, in inches."""
 
@@ -203,7 +206,8 @@ def plot_compare(
     first = next(iter(named.values()))
     with panels(ax, 1, height=ROW * len(named) + 0.3) as drawn:
         shown = stress_unit(unit or first.model.experiment.stress_unit)
-        ridges(drawn.axes[0], named, chosen, shown, prob=prob, truth=truth)
+        shown_names = {fill(name, LETTERS_OF_NAME): solution for name, solution in named.items()}
+        ridges(drawn.axes[0], shown_names, chosen, shown, prob=prob, truth=truth)
     return drawn.result
 
 

@@ -11,7 +11,7 @@ from tissuq.assessment.stable_posterior import stable_part
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
-from tissuq.inference.enumerators.line import ROUGH, Accuracy
+from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.enumerators.outer_search import Guide
 from tissuq.inference.solution import Enumerator, Solution
@@ -75,9 +75,11 @@ class Solver:
         """Return whether a model is solved as a sum over values of its noise."""
         return self._is_integrated(model) and not NoiseGrid.why_not(model)
 
-    def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
+    def _solve(self, models: Sequence[StatisticalModel], *, is_checked: bool = True) -> Sequence[Solution]:
         """Solve models on the same stretches: together by one enumerator, or each by NUTS where that does not serve."""
         enumerator = self._enumerator(models[0])
+        if isinstance(enumerator, AdaptiveCells):
+            enumerator = AdaptiveCells(is_checked)
         try:
             return enumerator.solve(models, self.seed)
         except ConvergenceError as error:
@@ -90,11 +92,12 @@ class Solver:
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy))
+        unchecked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
-            return self._solve([model])[0]
+            return self._solve([model], is_checked=next(unchecked, False))[0]
 
         return solve_known
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +50,18 @@ HEAVY_SHARE = 1e-6
 """Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
 
+@dataclass(frozen=True)
 class AdaptiveCells:
-    """Adaptive quadrature over at most three nonlinear parameters; a single setting where there is none."""
+    """Adaptive quadrature over at most three nonlinear parameters; a single setting where there is none.
+
+    Parameters
+    ----------
+    is_checked : bool
+        Whether climbs from other values of the structure see that no mass was missed, which takes as long again; of
+        models that differ by the noise alone one tells it of all.
+    """
+
+    is_checked: bool = True
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""
@@ -101,7 +111,7 @@ class AdaptiveCells:
         with one_thread():
             return [
                 _solution(integration, index, seed)
-                for integration in map(_Integration, blocks)
+                for integration in (_Integration(block, is_checked=self.is_checked) for block in blocks)
                 for index in range(len(integration.models))
             ]
 
@@ -109,7 +119,7 @@ class AdaptiveCells:
 class _Integration:
     """Everything that data sets on the same stretches share while their nonlinear parameters are integrated."""
 
-    def __init__(self, models: Sequence[StatisticalModel]) -> None:
+    def __init__(self, models: Sequence[StatisticalModel], *, is_checked: bool) -> None:
         self.models = models
         self.conditional = ConditionalGaussian(models)
         self.dimension = len(models[0].nonlinear)
@@ -124,7 +134,7 @@ class _Integration:
         else:
             self.settings = np.zeros((len(models), 1, 0))
         self.gaussians = self.conditional(self.settings)
-        if self.rule and len(models[0].structure) > 1:
+        if is_checked and self.rule and len(models[0].structure) > 1:
             for index in range(len(models)):
                 self._check_found(index, self.rule.weights[index])
 
