@@ -21,6 +21,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.inference.solution import Marginals, Solution
+from tissuq.parameters.checks import check_probability
 from tissuq.prediction.bands import predict_bands, stress_ratio
 from tissuq.prediction.densities import MAX_KHAT
 from tissuq.prediction.scores import judged
@@ -71,8 +72,7 @@ class Average:
         """
         import pandas as pd
 
-        if not 0 < prob < 1:
-            raise InputError(f"prob must be between 0 and 1, not {prob}.")
+        check_probability(prob)
         rows = [(marginal.mean, marginal.sd, *marginal.hdi(prob)) for marginal in self.marginals.values()]
         parameters = next(iter(self.solutions.values())).model.material.parameters
         scales = [[self._unit.to_mpa if parameter.unit else 1.0] for parameter in parameters]

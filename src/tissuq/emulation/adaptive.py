@@ -15,7 +15,7 @@ from tissuq.emulation.length_scales import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
 from tissuq.emulation.runs import ForwardRuns, PointSet, space_filling
 from tissuq.errors import InputError
-from tissuq.parameters.seeds import check_seed
+from tissuq.parameters.checks import check_seed
 
 __all__ = ["EmulationSettings", "Runner", "calibrated"]
 

@@ -15,8 +15,8 @@ from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.emulation.warnings import calibration_warnings
-from tissuq.errors import InputError
 from tissuq.inference.marginal import Marginal
+from tissuq.parameters.checks import check_probability
 from tissuq.prediction.bands import Mixtures
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ class Calibration:
         """
         import pandas as pd
 
-        _check_probability(prob)
+        check_probability(prob)
         rows = [
             (marginal.mean, marginal.sd, float(marginal.quantile(0.5)), *marginal.hdi(prob), self.posterior.ess[symbol],
              self.posterior.rhat.get(symbol, np.nan), self.emulator_share[symbol])
@@ -202,7 +202,7 @@ class Calibration:
         """
         import pandas as pd
 
-        _check_probability(prob)
+        check_probability(prob)
         mean, variance = self.likelihood.predictions(self.draws(PREDICTION_DRAWS), discrepancy=discrepancy, noise=noise)
         mixture = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
         low, high = (mixture.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
@@ -279,11 +279,6 @@ class Calibration:
             f"<Calibration of {', '.join(self.problem.symbols)}: discrepancy {self.problem.discrepancy.name}, "
             f"{len(self.problem.measured)} measurements, {len(self.runs)} runs, {self.posterior.method}>"
         )
-
-
-def _check_probability(prob: float) -> None:
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")
 
 
 PREDICTIVE_STRIDE = 4

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.errors import InputError
-
-__all__ = ["INTERVAL_COLUMNS", "check_probability", "interval"]
+__all__ = ["INTERVAL_COLUMNS", "interval"]
 
 FloatArray = NDArray[np.float64]
 
@@ -20,9 +18,3 @@ def interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:
     count = round(prob * len(values))
     start = int((values[count:] - values[: len(values) - count]).argmin())
     return float(np.median(values)), float(values[start]), float(values[start + count])
-
-
-def check_probability(prob: float) -> None:
-    """Refuse a probability that is none, or of all or nothing."""
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")

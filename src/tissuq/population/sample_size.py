@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.parameters.checks import check_probability
 from tissuq.population.draws import PopulationDraws
 from tissuq.population.hierarchy import EFFECT_PRIOR_SD, MEAN_PRIOR_SD
-from tissuq.population.intervals import check_probability
 from tissuq.population.likelihoods import mixtures_of
 
 if TYPE_CHECKING:

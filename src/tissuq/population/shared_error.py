@@ -22,9 +22,10 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.checks import check_probability
 from tissuq.parameters.priors import Flat, Prior
 from tissuq.population.draws import PopulationDraws
-from tissuq.population.intervals import check_probability, interval
+from tissuq.population.intervals import interval
 from tissuq.population.likelihoods import Coordinates, on_line
 from tissuq.population.sample_size import relative_width, score
 from tissuq.posterior.posterior import Posterior

@@ -30,7 +30,7 @@ from tissuq.mechanics.rays import MAX_CORNER_EXCESS, Range, scores, through, wit
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy.blocks import Coordinates
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.seeds import check_seed
+from tissuq.parameters.checks import check_seed
 from tissuq.pictures.draws import curves
 from tissuq.prediction.moments import values_of
 

@@ -17,8 +17,8 @@ from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import AS_TESTED, ESTIMANDS, Tolerances
+from tissuq.parameters.checks import check_seed
 from tissuq.parameters.priors import Prior
-from tissuq.parameters.seeds import check_seed
 from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import METHODS, Method, Solver

@@ -12,6 +12,7 @@ from tissuq.assessment.modulus import modulus
 from tissuq.errors import InputError
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
+from tissuq.parameters.checks import check_probability
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import leave_one_out, pointwise_log_likelihood, replicate_data, stride
 
@@ -121,8 +122,7 @@ def summaries(
 ) -> dict[str, dict[str, float]]:
     """Return mean, sd, median and interval of the parameters that are asked for, in MPa; see `Posterior.summary`."""
     model = solution.model
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    check_probability(prob)
     wanted = model.symbols if parameters is None else tuple(parameters)
     unknown = [symbol for symbol in wanted if symbol not in model.symbols]
     if unknown:

@@ -19,6 +19,7 @@ from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.checks import check_probability
 from tissuq.prediction.moments import variance_of_noise
 from tissuq.prediction.stress import Stress
 
@@ -297,8 +298,7 @@ def asked_for(
     """
     loading = loading_mode(mode) if mode is not None else _only_mode(solutions[0].model.experiment)
     points = checked_points(loading, np.atleast_1d(stretch))
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    check_probability(prob)
     if not 0 <= channel < len(loading.stresses):
         raise InputError(f"mode '{loading.name}' has the stresses {', '.join(loading.stresses)}: no number {channel}.")
     for solution in solutions:

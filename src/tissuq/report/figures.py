@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
-from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure, shortened
+from tissuq.drawing.panels import Panels, columns_of, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
-from tissuq.drawing.style import BAND, BASE, INK, STYLE, TRUTH, new_figure, save_figure
+from tissuq.drawing.style import BASE, TRUTH, new_figure, save_figure
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.answer import answer_on_new_figure
@@ -24,16 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "BAND",
-    "BASE",
-    "INK",
-    "STYLE",
-    "TRUTH",
     "answer_figure",
     "described_curves",
-    "legend_above",
     "marginal_figure",
-    "new_figure",
     "predictive_figure",
     "save_figure",
 ]

@@ -18,10 +18,15 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.picture import height_of, numbers_of
-from tissuq.report.covariates import copy_of_covariates, effects_of_covariates, patient_in_words
+from tissuq.report.population_tables import (
+    copy_of_covariates,
+    effects_of_covariates,
+    needed_of,
+    needed_table_of,
+    patient_in_words,
+)
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT, law_files
-from tissuq.report.sample_size import needed_of, needed_table_of
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy

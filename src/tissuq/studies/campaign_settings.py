@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from tissuq.parameters.seeds import MAX_SEED
+from tissuq.parameters.checks import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.option_texts import priors, tolerances
 from tissuq.studies.settings import SizesOfErrors

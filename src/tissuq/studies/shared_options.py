@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
-from tissuq.parameters.seeds import MAX_SEED
+from tissuq.parameters.checks import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
 
 if TYPE_CHECKING:

@@ -1,19 +1,26 @@
-"""Effects of covariates on a population, as tables and sentences for people, and the copy of their file."""
+"""Tables of a population for people: effects of covariates, and how many specimens are needed."""
 
 from __future__ import annotations
 
+from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tissuq.population.effects import ALL_COVARIATES
+from tissuq.population.sample_size import MAX_SPECIMENS
 from tissuq.report.result import Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import percent, significant
 from tissuq.studies.population import PopulationStudy
 
-__all__ = ["copy_of_covariates", "effects_of_covariates", "patient_in_words"]
+if TYPE_CHECKING:
+    import pandas as pd
 
-HEADERS = ["parameter", "covariate", "effect", "95 % HPD", "positive"]
+__all__ = ["copy_of_covariates", "effects_of_covariates", "needed_of", "needed_table_of", "patient_in_words"]
+
+HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % HPD", "positive"]
+HEADERS_OF_NUMBERS = ["parameter", "quantity", "now", "with any number", "specimens in all", "more"]
+QUANTITIES = {"median": "median of the population", "new patient": "a new patient"}
 COPY = "covariates-of-specimens"
 """The name of the table of covariates in a run's folder."""
 
@@ -39,7 +46,7 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
         rows.append([symbol, "all" if name == ALL_COVARIATES else name, words, f"[{low}, {high}]", cells])
     return (
         Table(
-            HEADERS, rows, "Effects of covariates", (1, 2),
+            HEADERS_OF_EFFECTS, rows, "Effects of covariates", (1, 2),
             f"Medians of the population are at {population.covariates.described({})}; a new patient has "
             f"{population.covariates.described(population.patient_covariates)}. Of the variance between specimens: "
             "the share that all covariates explain.",
@@ -60,3 +67,30 @@ def copy_of_covariates(study: PopulationStudy, beside: Path) -> tuple[dict[str, 
     source = beside / study.settings.covariates
     place = f"{INPUT}/{COPY}{source.suffix}"
     return {place: source}, {"covariates": place}
+
+
+def needed_of(study: PopulationStudy) -> pd.DataFrame | None:
+    """Return `Population.specimens_needed` for the aim of the settings, if there is one."""
+    aim = study.settings.aim
+    return None if aim is None else study.population.specimens_needed(aim)
+
+
+def needed_table_of(study: PopulationStudy, needed: pd.DataFrame | None) -> tuple[Table, ...]:
+    """Return the table of how many specimens are needed; none without an aim."""
+    if needed is None:
+        return ()
+    aim, rows = float(study.settings.aim or 0.0), []
+    for row in needed.reset_index().to_dict("records"):
+        total, floor = float(row["specimens"]), float(row["floor"])
+        none = "not reached: patients differ more" if floor else f"more than {MAX_SPECIMENS}"
+        cells = [none, ""] if isnan(total) else [f"{total:.0f}", f"{row['more']:.0f}"]
+        shown = [f"± {percent(row['now'])}", f"± {percent(floor)}" if floor else ""]
+        rows.append([str(row["parameter"]), QUANTITIES[str(row["quantity"])], *shown, *cells])
+    return (
+        Table(
+            HEADERS_OF_NUMBERS, rows, f"Specimens like these for ± {percent(aim)} (95 %)", (1, 4),
+            "Half the interval over the median. With so many specimens four of five populations reach the aim. However "
+            "many there are, patients differ as much as they do. By how much is not known well from few specimens, so "
+            "that the interval of a new patient with any number, which holds in four of five, may be wider than now.",
+        ),
+    )  # fmt: skip

@@ -1,0 +1,35 @@
+"""What numbers of many functions may be: seeds that every generator takes and every file holds, and probabilities."""
+
+from __future__ import annotations
+
+from numbers import Integral
+
+from tissuq.errors import InputError
+
+__all__ = ["MAX_SEED", "check_probability", "check_seed"]
+
+MAX_SEED = 2**62
+
+
+def check_seed(seed: object) -> None:
+    """Refuse what is no seed.
+
+    Raises
+    ------
+    InputError
+        When it is not a whole number from 0 to `MAX_SEED`.
+    """
+    if not isinstance(seed, Integral) or not 0 <= int(seed) <= MAX_SEED:
+        raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, not {seed!r}.")
+
+
+def check_probability(prob: float) -> None:
+    """Refuse a probability of an interval that is none, or of all or nothing.
+
+    Raises
+    ------
+    InputError
+        When it is not between 0 and 1.
+    """
+    if not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob}.")
