@@ -176,7 +176,7 @@ def check_sets(deck: Deck, quantities: Iterable[Quantity], solver: Solver | None
 
 def _check_printed(deck: Deck, quantity: Component) -> None:
     """Refuse a field in a set of elements that CalculiX is not asked to print."""
-    files, set_name = list(deck.files.values()), quantity.set_name
+    files, set_name = list(deck.files.values()), quantity.set_name.rpartition(".")[2]
     if set_name in deck.format.set_names(files, of_elements=False):
         return
     if (quantity.kind, set_name) not in deck.format.printed_elements(files):

@@ -182,14 +182,16 @@ def _at_ends(
     problem: Problem, emulator: Emulator, posterior: SampledPosterior
 ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
     """Return where the posterior is at bounds of priors, and where it is beyond all runs: parameters and which end."""
-    at_bounds, beyond_runs = [], []
+    at_bounds: list[tuple[str, str]] = []
+    beyond_runs: list[tuple[str, str]] = []
     for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
-        bounds, values = problem.priors[symbol].support, posterior.values[:, problem.symbols.index(symbol)]
+        prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
         run_ends, signs = (float(column.min()), float(column.max())), (1.0, -1.0)
         edge = EDGE_WIDTH * (run_ends[1] - run_ends[0])
-        for end, bound, run_end, sign in zip(("lower", "upper"), bounds, run_ends, signs, strict=True):
-            if posterior.weights[sign * (values - bound) < edge].sum() > MAX_EDGE_PROBABILITY:
-                at_bounds.append((symbol, end))
-            elif posterior.weights[sign * (values - run_end) < 0].sum() > MAX_EDGE_PROBABILITY:
-                beyond_runs.append((symbol, end))
+        for end, bound, run_end, sign in zip(("lower", "upper"), prior.support, run_ends, signs, strict=True):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                is_cut = np.isfinite(prior.log_density(bound))
+            is_beyond = sign * (values - bound) < edge if is_cut else sign * (values - run_end) < 0
+            if posterior.weights[is_beyond].sum() > MAX_EDGE_PROBABILITY:
+                (at_bounds if is_cut else beyond_runs).append((symbol, end))
     return at_bounds, beyond_runs

@@ -92,12 +92,12 @@ class Solver:
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy))
-        unchecked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
+        are_checked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
-            return self._solve([model], is_checked=next(unchecked, False))[0]
+            return self._solve([model], is_checked=next(are_checked, False))[0]
 
         return solve_known
 
