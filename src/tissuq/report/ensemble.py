@@ -138,6 +138,8 @@ def _next_step(study: EnsembleStudy, folder: Path, beside: Path) -> str:
             "look at why draws failed, below. To make them again, where the solver was at fault, repeat the command "
             "with --again; a model with other increments or another mesh needs another --out."
         )
+    if next(iter(study.prepared.ensembles.values())).origin:  # no test of the material was fitted that another adds to
+        return "compare the band with a measurement of your own, if there is one."
     beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))
     if beyond is not None and beyond > MUCH_BEYOND:
         return f"measure up to the strains of the model: {design} says which test helps most"

@@ -166,7 +166,7 @@ def _shares(prediction: Prediction) -> list[Number]:
 
 
 def _next_step(prediction: Prediction, run: str) -> str:
-    if not prediction.is_calibrated.all():
+    if prediction.posterior.solution.is_of_data and not prediction.is_calibrated.all():
         return f"see which test would make the extrapolated stress less uncertain: tissuq design {run}"
     if prediction.scores is None:
         return f"compare with a measurement of this mode, if there is one: tissuq predict {run} --data FILE"

@@ -137,7 +137,8 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
 
 
 def _next_step(simulation: Simulation, run: str) -> str:
-    if (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
+    is_of_tests = not simulation.ensembles[COMPLETE].origin
+    if is_of_tests and (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
         return f"measure up to the strains of the body: tissuq design {run} says which test helps most"
     return f"run your own model with the same draws: tissuq ensemble {run} MODEL --replace NAME --qoi NAME=WHAT"
 
