@@ -305,6 +305,11 @@ def test_covariates_may_stand_in_the_file_of_the_specimens(here):
     found = settings.covariate_table([])
     assert found.values() == {f"S{k}": {"age": str(age)} for k, age in enumerate(AGES)}
     assert list(settings.readings()) == list(found.values())
+    first = {line.partition(",")[0]: line for line in reversed(aged)}
+    once = [line if first[line.partition(",")[0]] == line else line.rpartition(",")[0] + "," for line in aged]
+    assert once != aged
+    (here / "all.csv").write_text("\n".join(once) + "\n")
+    assert settings.covariate_table([]).values() == {f"S{k}": {"age": str(age)} for k, age in enumerate(AGES)}
     (here / "all.csv").write_text("\n".join([*aged[:3], aged[3][:-2] + "31", *aged[4:]]) + "\n")
     with pytest.raises(
         tq.InputError, match=r"all\.csv, line 4, column 'age': '31' for specimen 'S0', which has '30' in"

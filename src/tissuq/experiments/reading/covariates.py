@@ -49,7 +49,7 @@ class CovariateTable:
         return {name: self.specimens.index(name) for name in dict.fromkeys(self.specimens)}
 
     def values(self) -> dict[str, dict[str, str]]:
-        """Return the values of every specimen.
+        """Return the values of every specimen: those of its rows that have one.
 
         Raises
         ------
@@ -58,13 +58,17 @@ class CovariateTable:
         """
         found: dict[str, dict[str, str]] = {specimen: {} for specimen in self._rows}
         for name, column in self.columns.items():
-            for row, (specimen, cell) in enumerate(zip(self.specimens, self.table.texts(column), strict=True)):
-                if found[specimen].setdefault(name, cell) != cell:
+            texts, rows = self.table.texts(column), dict[str, int]()
+            for row, (specimen, cell) in enumerate(zip(self.specimens, texts, strict=True)):
+                known = rows.setdefault(specimen, row) if cell else row
+                if texts[known] != cell:
                     raise InputError(
                         f"{self.table.place(column, row)}: '{cell}' for specimen '{specimen}', which has "
-                        f"'{found[specimen][name]}' in {self.table.counted} {self.table.lines[self._rows[specimen]]}. "
+                        f"'{texts[known]}' in {self.table.counted} {self.table.lines[known]}. "
                         "A covariate is the same in all rows of a specimen."
                     )
+            for specimen, values in found.items():
+                values[name] = texts[rows[specimen]] if specimen in rows else ""
         return found
 
     def place(self, specimen: str, covariate: str) -> str:
