@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,16 @@ def test_a_stress_next_to_the_reference_is_a_preload_only_where_the_curve_misses
     stress = 1e3 * neo_hookean(stretch)
     assert abs(stress[0]) > 0.05 * stress.max()
     assert ("the stress is already" in notes(inspected(stretch, stress + offset))) is (offset != 0)
+
+
+def test_a_reading_that_strays_as_others_do_is_no_preload_and_the_zero_is_that_of_a_line(inspected):
+    stretch = np.linspace(0.88, 1.2, 18)
+    stress = 1.6 * (stretch - stretch**-2) + np.random.default_rng(3).normal(0, 0.05, 18)
+    stress[6] = -0.2024  # 2.7 standard deviations off, beside stretch 1
+    assert "the stress is already" not in notes(inspected(stretch, stress))
+    said = notes(inspected(stretch, stress + 0.5))
+    (zero,) = re.findall(r'--load-zero "(\S+) kPa"', said)
+    assert abs(float(zero) - 0.5) < 0.12
 
 
 def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
