@@ -88,9 +88,7 @@ def calibration_warnings(
         )
         yield f"{emulator.runs.failure_summary} {position}"
     yield from _emulator_warnings(problem, check, posterior, exact, emulator_share)
-    at_bounds, beyond_runs = (
-        [f"{symbol} ({end})" for symbol, end in ends] for ends in _at_ends(problem, emulator, posterior)
-    )
+    at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
         yield (
             f"the posterior lies beyond the runs of the model in {', '.join(beyond_runs)}, which lie where its prior "
@@ -178,12 +176,10 @@ def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> flo
     return float(runs.failed[nearest].mean())
 
 
-def _at_ends(
-    problem: Problem, emulator: Emulator, posterior: SampledPosterior
-) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[list[str], list[str]]:
     """Return where the posterior is at bounds of priors, and where it is beyond all runs: parameters and which end."""
-    at_bounds: list[tuple[str, str]] = []
-    beyond_runs: list[tuple[str, str]] = []
+    at_bounds: list[str] = []
+    beyond_runs: list[str] = []
     for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
         prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
         run_ends, signs = (float(column.min()), float(column.max())), (1.0, -1.0)
@@ -193,5 +189,5 @@ def _at_ends(
                 is_cut = np.isfinite(prior.log_density(bound))
             is_beyond = sign * (values - bound) < edge if is_cut else sign * (values - run_end) < 0
             if posterior.weights[is_beyond].sum() > MAX_EDGE_PROBABILITY:
-                (at_bounds if is_cut else beyond_runs).append((symbol, end))
+                (at_bounds if is_cut else beyond_runs).append(f"{symbol} ({end})")
     return at_bounds, beyond_runs

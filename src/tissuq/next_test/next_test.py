@@ -91,11 +91,6 @@ class NextTest:
         for target in targets:
             for mode, points in target.points:
                 self._check_candidate(Candidate(mode, points), f"target '{target.name}'")
-        for target, sd in zip(targets, self.sd_now, strict=True):
-            if not sd > 0:
-                raise InputError(
-                    f"target '{target.name}': its value is known already, so that no test tells more of it."
-                )
 
     def expected(self, candidate: Candidate) -> Expected:
         """Return the expectation for a candidate.

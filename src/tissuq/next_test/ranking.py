@@ -85,6 +85,9 @@ def rank_tests(
         raise InputError(f"a test has one measurement or more, not {min(points)}.")
     targets_asked = list(dict.fromkeys(target_named(candidate, model) for candidate in targets or [MODULUS]))
     next_test = NextTest(solution, targets_asked, specimen, seed)
+    for target, sd in zip(targets_asked, next_test.sd_now, strict=True):
+        if not sd > 0:
+            raise InputError(f"target '{target.name}': its value is known already, so that no test tells more of it.")
     is_energy = model.discrepancy.is_energy and not model.is_correlated
     defaults = list(default_candidates(model.experiment, model.material, is_energy=is_energy, points=tuple(points)))
     requested = [

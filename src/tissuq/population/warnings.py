@@ -48,10 +48,12 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
 
 def _equal_specimens(population: PopulationDraws) -> Iterator[str]:
     """Yield a warning about specimens with the same measurements: files or rows that were copied."""
-    of_measurements: dict[bytes, list[str]] = {}
-    for name, posterior in population.posteriors.items():
-        of_measurements.setdefault(posterior.model.experiment.measured.tobytes(), []).append(name)
-    copies = [" and ".join(names) for names in of_measurements.values() if len(names) > 1]
+    experiments = {name: posterior.model.experiment for name, posterior in population.posteriors.items()}
+    alike = [
+        [name for name, same in experiments.items() if experiment.has_measurements_of(same)]
+        for experiment in experiments.values()
+    ]
+    copies = dict.fromkeys(" and ".join(names) for names in alike if len(names) > 1)
     if copies:
         yield (
             f"the measurements of {'; of '.join(copies)} are equal to the last digit, as copies are: keep one of "

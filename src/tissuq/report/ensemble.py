@@ -104,7 +104,7 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
         numbers=_numbers(study, tables),
         finding=_lead(study, tables),
         next_step=_next_step(study, folder, beside),
-        picture=Picture("answer", lambda: band_over_time(result, first), f"Band of {first} over time",
+        picture=Picture("answer", lambda: band_over_time(tables[first], first), f"Band of {first} over time",
                         f"{first}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
         tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
                       note=f"{_of_sector(study)} {_of_mesh(study, tables)}".strip()),),
@@ -334,7 +334,7 @@ def _quantity(study: EnsembleStudy, name: str, table: pd.DataFrame, headers: lis
     shares = " Right: shares of the variance, ± one standard error (bootstrap)." * is_shared
     figure = Picture(
         f"quantity-{name}",
-        lambda: quantity_figure(study.result, name),
+        lambda: quantity_figure(study.result, table, name),
         f"Band of {name} over time, and its values at the end",
         f"Left: mean and {headers[4]} band over draws of the posterior, over the time of the model. "
         f"{'Middle' if is_shared else 'Right'}: the draws at its end.{shares}",

@@ -15,7 +15,7 @@ from tissuq.decks.model_ensemble import ModelEnsemble
 from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
 from tissuq.report.band_table import SHARES as ALL_SHARES
-from tissuq.report.band_table import mesh_ratio, percent_of, prefix_of, shares_in
+from tissuq.report.band_table import last_row, mesh_ratio, percent_of, prefix_of, shares_in
 from tissuq.report.simulation_figures import draw_shares
 
 if TYPE_CHECKING:
@@ -30,9 +30,8 @@ FloatArray = NDArray[np.float64]
 SHARES = {name: color for name, color in ALL_SHARES.items() if name != "noise"}
 
 
-def band_over_time(ensemble: ModelEnsemble, name: str) -> Figure:
-    """Return the band of a quantity over time, for the head of a page."""
-    table = ensemble.table(name)
+def band_over_time(table: pd.DataFrame, name: str) -> Figure:
+    """Return the band of a quantity over time, from its table, for the head of a page."""
     with new_figure(ANSWER_WIDTH, 3.6) as figure:
         _draw_band(figure.subplots(), table[table["draws"] > 1], name)
     return figure
@@ -50,15 +49,14 @@ def _draw_band(axis: Axes, table: pd.DataFrame, name: str) -> None:
     axis.legend(fontsize=9)
 
 
-def quantity_figure(ensemble: ModelEnsemble, name: str) -> Figure:
+def quantity_figure(ensemble: ModelEnsemble, table: pd.DataFrame, name: str) -> Figure:
     """Draw the band of a quantity over time, the last values, and the shares of the variance where there are any."""
     with new_figure(9.6, 3.7) as figure:
-        table = ensemble.table(name)
         has_shares = bool(shares_in(table, is_shared=ensemble.is_shared)) and len(ensemble.times[name]) > 1
         axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
         table = table[table["draws"] > 1]
         _draw_band(axes[0], table, name)
-        last = ensemble.last_values(name) * mesh_ratio({str(key): value for key, value in table.iloc[-1].items()})
+        last = ensemble.last_values(name) * mesh_ratio(last_row(table))
         axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
         axes[1].set_title(f"{name} at the end")
         axes[1].set_ylabel("draws")

@@ -84,7 +84,7 @@ class TestedStress:
         restarts = [
             cycle.stop
             for cycle in self.cycles[:-1]
-            if abs(np.diff(self.course[cycle.stop - 1 : cycle.stop + 1]).sum())
+            if abs(self.course[cycle.stop] - self.course[cycle.stop - 1])
             > RESTART * np.ptp(self.course[cycle.start : cycle.stop])
         ]
         return np.setdiff1d(outliers, [row for stop in restarts for row in (stop - 1, stop)])
