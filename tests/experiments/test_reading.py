@@ -365,6 +365,14 @@ def test_lines_may_end_in_any_way(tmp_path, end):
     assert "line 4, column 'stress': 'x'" in message(path)
 
 
+def test_a_return_at_the_end_of_a_cell_ends_no_line(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_bytes(b"stretch,stress\n1.0\r,0.0\n1.1\r,x\n1.2\r,1\n")
+    assert "line 3, column 'stress': 'x'" in message(path)
+    path.write_bytes(b"stretch,stress\n1.0\r,0.0\n1.1\r,0.5\n1.2\r,1\n")
+    assert read_experiment(path).stress.tolist() == [0.0, 0.5, 1.0]
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1"])
 def test_files_may_be_in_any_usual_encoding(tmp_path, encoding):
     path = tmp_path / "test.csv"

@@ -39,6 +39,8 @@ FORTRAN_EXPONENT = re.compile(r"(\d\.\d*|\.\d+)[dD]([+-]\d{2,3})\b")
 """As in ``1.234D+02``."""
 LINE_END = re.compile(r"(?<!\r)\r+\n")
 """Of Windows, also where a program has made it twice (``\\r\\r\\n``): no line is between."""
+RETURN_IN_LINE = re.compile(r"\r(?=[,;\t])")
+"""A return that a program left at the end of a cell."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
 
@@ -56,7 +58,10 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """
     text = _decoded(path, _content(Path(path)))
     text = FORTRAN_EXPONENT.sub(r"\1e\2", text) if any(sign in text for sign in ("D+", "D-", "d+", "d-")) else text
-    lines = LINE_END.sub("\n", without_marks(text.replace("\u2212", "-"))).replace("\r", "\n").split("\n")
+    text = LINE_END.sub("\n", without_marks(text.replace("\u2212", "-")))
+    if "\n" in text:  # without one, a return ends a line
+        text = RETURN_IN_LINE.sub("", text)
+    lines = text.replace("\r", "\n").split("\n")
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines
