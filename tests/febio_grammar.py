@@ -2,9 +2,9 @@
 
 FEBioXML/FEBioMaterialSection3.cpp, ``Parse``: the id of a material is the number of those before it plus one, and its
 name is not theirs. FEBioMech/FEBioMech.cpp names the types; ``BEGIN_FECORE_CLASS`` in FEMooneyRivlin.cpp, FEYeoh.cpp,
-FEOgdenMaterial.cpp, FEGentMaterial.cpp and FEVerondaWestmann.cpp their parameters and ranges, and that in
-FEUncoupledMaterial.cpp ``k`` for all of them, which its ``Init`` wants positive of a material that is part of no other,
-and sets to zero of one that is. Nothing here knows how tissuq writes cards.
+FEOgdenMaterial.cpp, FEGentMaterial.cpp, FEVerondaWestmann.cpp and FEHolzapfelGasserOgden.cpp their parameters and
+ranges, and that in FEUncoupledMaterial.cpp ``k`` for all of them, which its ``Init`` wants positive of a material that
+is part of no other, and sets to zero of one that is. Nothing here knows how tissuq writes cards.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 ANY: Callable[[float], bool] = lambda value: True  # noqa: E731
 POSITIVE: Callable[[float], bool] = lambda value: value > 0  # noqa: E731
+NOT_NEGATIVE: Callable[[float], bool] = lambda value: value >= 0  # noqa: E731
 NOT_ZERO: Callable[[float], bool] = lambda value: value != 0  # noqa: E731
 SIX = range(1, 7)
 TYPES = {
@@ -22,6 +23,11 @@ TYPES = {
     "Ogden": {f"c{n}": ANY for n in SIX} | {f"m{n}": NOT_ZERO for n in SIX},
     "Gent": {"G": POSITIVE, "Jm": POSITIVE},
     "Veronda-Westmann": {"c1": POSITIVE, "c2": POSITIVE},
+    "Holzapfel-Gasser-Ogden": {
+        **dict.fromkeys(("c", "k1", "k2"), NOT_NEGATIVE),
+        "kappa": lambda value: 0 <= value <= 1 / 3,
+        "gamma": ANY,
+    },
     "uncoupled solid mixture": {},
 }
 UNCOUPLED = {"k": lambda value: value >= 0, "density": POSITIVE}

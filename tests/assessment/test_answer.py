@@ -81,7 +81,7 @@ def test_a_negative_modulus_is_never_fit_for_simulation():
 
 
 @pytest.mark.slow
-def test_fibres_are_taken_into_finite_elements_with_care_and_not_with_a_free_energy():
+def test_fibres_are_taken_into_finite_elements_with_care_and_not_with_a_free_energy_from_one_stress():
     material, stretch = "neo-hookean+standard-fibres:one@0", np.linspace(1.02, 1.3, 12)
     data = tq.simulate(material, {"C10": 0.01, "k": 0.02}, stretch, noise_sd=1e-4, seed=2)
     posterior = tq.fit(data, material=material, discrepancy="none", noise_sd=1e-4)
@@ -89,7 +89,15 @@ def test_fibres_are_taken_into_finite_elements_with_care_and_not_with_a_free_ene
     assert "cards" in posterior.answer.uses[3].reason
     posterior = tq.fit(data, material=material, discrepancy="auto", noise_sd=1e-4)
     assert verdicts(posterior)[3] is Verdict.NO
-    assert "energy discrepancy" in posterior.answer.uses[3].reason
+    assert "one stress was measured" in posterior.answer.uses[3].reason
+    points = [
+        (1 + a * share, 1 + b * share) for a, b in ((0.3, 0.3), (0.3, 0.1), (0.1, 0.3)) for share in (0.4, 0.7, 1)
+    ]
+    law = "neo-hookean+standard-fibres@40"
+    data = tq.simulate(law, {"C10": 0.02, "k": 0.05}, points, mode="biaxial", noise_sd=2e-4, seed=1)
+    posterior = tq.fit(data, material=law, noise_sd=2e-4)
+    assert verdicts(posterior)[3] is Verdict.CARE
+    assert "FEBio alone" in posterior.answer.uses[3].reason
 
 
 @pytest.mark.slow

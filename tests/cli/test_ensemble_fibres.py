@@ -33,8 +33,9 @@ def sheet(cli, here):
     ]
     (here / "sheet.csv").write_text("stretch x,stretch y,stress x (kPa),stress y (kPa)\n" + "\n".join(rows) + "\n")
 
-    def fit(material):
-        words = ["--mode", "biaxial", "--material", material, "--noise-sd", 5, "--discrepancy", "none", "--no-figures"]
+    def fit(material, discrepancy="none"):
+        words = ["--mode", "biaxial", "--material", material, "--noise-sd", 5, "--no-figures"]
+        words += ["--discrepancy", discrepancy]
         fitted = cli("fit", "sheet.csv", *words)
         assert fitted.status == 0, fitted.err
 
@@ -78,8 +79,9 @@ def test_a_draw_of_fibres_is_chosen_for_a_finer_model(cli, here, sheet):
 
 
 @pytest.mark.slow
-def test_axes_of_a_material_of_febio_stay(cli, here, sheet):
-    sheet("neo-hookean+exponential-fibres@30")
+@pytest.mark.parametrize("discrepancy", ["none", "auto"])
+def test_axes_of_a_material_of_febio_stay(cli, here, sheet, discrepancy):
+    sheet("neo-hookean+exponential-fibres@30", discrepancy)
     axes = '<mat_axis type="vector"><a>0,1,0</a><d>1,0,0</d></mat_axis>'
     deck = (
         '<?xml version="1.0"?>\n<febio_spec version="4.0">\n<Material>\n'
@@ -88,9 +90,10 @@ def test_axes_of_a_material_of_febio_stay(cli, here, sheet):
     )
     (here / "wall.feb").write_text(deck)
     (here / "mine.py").write_text("def first(folder):\n    return 1.0\n")
-    words = ["--qoi", "first=mine.py:first", "--solver", "febio4", "--dry-run"]
+    words = ["--qoi", "first=mine.py:first", "--solver", "febio4", "--dry-run", "--draws", 2, "--all-draws"]
     said = cli("ensemble", "runs/sheet", "wall.feb", "--replace", "Wall", *words)
     assert said.status == 0, said.err
-    assert "+      <gamma>3.0000000000e+01</gamma>" in said.out
+    assert ('+      <solid type="Holzapfel-Gasser-Ogden">' in said.out) == (discrepancy == "auto")
+    assert "<gamma>3.0000000000e+01</gamma>" in said.out
     assert f"-{axes}" not in said.out
     assert axes in said.out

@@ -10,6 +10,8 @@ import pytest
 from scipy.optimize import root
 
 import tissuq as tq
+from card_readers import febio_solid
+from febio_grammar import refusals
 from one_element import CCX, FREE, calculix
 from tissuq.experiments.modes import Deformation
 from tissuq.export import CardSettings, card_format
@@ -70,13 +72,19 @@ def calculix_card(text):
 
 
 def febio(text):
-    """The same of FEBio's Holzapfel-Gasser-Ogden, after FEHolzapfelGasserOgden.cpp."""
+    """The same of FEBio's Holzapfel-Gasser-Ogden."""
     (material,) = ElementTree.fromstring(text.encode()).find("Material")
+    return febio_fibres(material)
+
+
+def febio_fibres(material):
+    """The same of an element of that type, after FEHolzapfelGasserOgden.cpp."""
     assert material.get("type") == "Holzapfel-Gasser-Ogden"
     known = {each.tag: float(each.text) for each in material}
     angle = np.radians(known["gamma"])
     vectors = [np.array([np.cos(angle), sign * np.sin(angle), 0.0]) for sign in (1, -1)]
-    return known["c"] / 2, [(known["k1"], known["k2"], known["kappa"], vector) for vector in vectors], known["k"]
+    fibres = [(known["k1"], known["k2"], known["kappa"], vector) for vector in vectors]
+    return known["c"] / 2, fibres, known.get("k")
 
 
 READERS = {"abaqus": abaqus, "calculix": calculix_card, "febio": febio}
@@ -143,13 +151,57 @@ def test_a_card_of_fibres_has_the_stresses_of_its_draw(given, code, case):
         ("febio", TILTED, "abaqus or calculix"),
         ("ansys", EXPONENTIAL, "abaqus or calculix or febio"),
         ("ls-dyna", EXPONENTIAL, r"fields of its \*MAT_295.*abaqus or calculix or febio"),
-        ("abaqus", ("demiray+exponential-fibres@30", [0.02, 1.0, 0.05, 2.0]), "no code here has all of it"),
+        ("abaqus", ("demiray+exponential-fibres@30", [0.02, 1.0, 0.05, 2.0]), "nothing beside.*cards for febio"),
+        ("abaqus", ("demiray+exponential-fibres:one@30", [0.02, 1.0, 0.05, 2.0]), "no code here has all of it"),
         ("table", EXPONENTIAL, "W1 and W2 do not tell"),
     ],
 )
 def test_fibres_that_a_code_has_not_are_refused_with_the_codes_that_have_them(given, code, case, words):
     with pytest.raises(tq.InputError, match=words):
         card_format(code).cards(given(case[0], case[1]), CardSettings())
+
+
+@pytest.fixture(scope="module")
+def of_free_energy():
+    """Return draws of fibres with the free energy of a discrepancy beside them."""
+    name = "mooney-rivlin+exponential-fibres@40"
+    truth = {"C10": 0.01, "C01": 0.01, "k1": 0.05, "k2": 2.0}
+    data = tq.simulate(name, truth, POINTS, mode="biaxial", noise_sd=5e-4, seed=1)
+    return tq.fit(data, material="neo-hookean+exponential-fibres@40", noise_sd=5e-4).ensemble(4)
+
+
+@pytest.mark.slow
+def test_febio_adds_fibres_to_the_nearest_mixture_of_a_free_energy(of_free_energy):
+    cards = card_format("febio").cards(of_free_energy, CardSettings(unit="kPa"))
+    assert "all but that of the fibres, which is exact" in cards.warnings[0]
+    points = np.array([(1.3, 1.1), (1.05, 1.3), (1.2, 1.2), (1.1, 1.3)])
+    paths, step = tq.loading_modes()["biaxial"]().paths, 1e-6
+    for draw, row, text in zip(of_free_energy, cards.index, cards.files.values(), strict=True):
+        assert refusals(text) == []
+        (material,) = ElementTree.fromstring(text.encode()).find("Material")
+        assert row["bulk_modulus"] == pytest.approx(float(material.find("k").text), rel=1e-6)
+        *matrix, fibres = material.findall("solid")
+        known, solids = febio_fibres(fibres), [febio_solid(solid) for solid in matrix]
+        assert known[0] == 0
+
+        def of_card(one, two, *, known=known, solids=solids):
+            stretches = np.array([one, two, 1 / (one * two)])
+            return energy(known, np.diag(stretches**2)) + sum(solid.energy(stretches) for solid in solids)
+
+        for axis, path in enumerate(paths):
+            wanted = 1e3 * tq.engineering_stress(draw, path, points, ())
+            nudge = step * np.eye(2)[axis]
+            found = [(of_card(*(point + nudge)) - of_card(*(point - nudge))) / (2 * step) for point in points]
+            # The error that is stated is a share of the stress without fibres, which is less.
+            assert np.abs(found - wanted).max() < 2 * row["error_within_1_max"] * np.abs(wanted).max()
+    assert cards.index[0]["bulk_modulus"] > 1e3 * 2 * 4 / 3 * 25
+
+
+def test_a_free_energy_beside_fibres_goes_to_febio_or_felupe_or_is_left_out(of_free_energy):
+    with pytest.raises(tq.InputError, match=r"cards for febio\. Or fit without.*--discrepancy none.*FElupeMaterial"):
+        card_format("calculix").cards(of_free_energy, CardSettings())
+    with pytest.raises(tq.InputError, match="can be of the laws mixture"):
+        card_format("febio").cards(of_free_energy, CardSettings(law="ogden"))
 
 
 def test_fibres_are_not_projected_on_isotropic_laws(given):

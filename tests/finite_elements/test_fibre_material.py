@@ -94,6 +94,27 @@ def test_the_stress_turns_with_the_body_and_with_its_directions(name):
 
 
 @pytest.mark.slow
+def test_a_draw_has_the_free_energy_of_its_discrepancy_beside_its_fibres():
+    name = "mooney-rivlin+exponential-fibres@40"
+    truth = {"C10": 0.01, "C01": 0.01, "k1": 0.05, "k2": 2.0}
+    points = np.array([(1.1, 1.1), (1.3, 1.3), (1.2, 1.05), (1.05, 1.2), (1.3, 1.1), (1.1, 1.3)])
+    data = tq.simulate(name, truth, points, mode="biaxial", noise_sd=5e-4, seed=1)
+    (draw,) = tq.fit(data, material="neo-hookean+exponential-fibres@40", noise_sd=5e-4).ensemble(1)
+    assert draw.discrepancy is not None
+    umat = FElupeMaterial(draw, directions=ASKEW)
+    stretches = np.column_stack([points, 1 / points.prod(axis=1)])
+    along = np.vstack([ASKEW, np.cross(*ASKEW)])
+    F = np.einsum("ai,na,aj->ijn", along, stretches, along)  # stretched along the axes of the test
+    P = np.einsum("ai,ijn,aj->an", along, umat.gradient([F, None])[0], along)
+    for axis, path in enumerate(tq.loading_modes()["biaxial"]().paths):
+        without_pressure = P[axis] - P[2] * stretches[:, 2] / stretches[:, axis]
+        assert without_pressure == pytest.approx(engineering_stress(draw, path, points, ()), rel=1e-9)
+    F = gradients(4)
+    tangent = differences(lambda F: umat.gradient([F, None])[0], F)
+    np.testing.assert_allclose(umat.hessian([F, None])[0], tangent, atol=2e-7 * np.abs(tangent).max())
+
+
+@pytest.mark.slow
 def test_directions_may_differ_from_point_to_point_and_from_cell_to_cell():
     F = gradients(6).reshape(3, 3, 2, 3)
     name, each = "holzapfel-gasser-ogden", np.array([turn[:2] for turn in rotations(6, 11)])

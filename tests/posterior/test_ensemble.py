@@ -224,9 +224,20 @@ def test_a_matrix_that_is_unstable_is_left_out_with_its_fibres(monkeypatch):
     assert {name[-6:] for name in draws.admissible_in} == {"axis 1", "axis 2"}
 
 
-def test_fibres_with_a_free_energy_are_no_materials():
-    with pytest.raises(tq.ModelError, match=r"has fibres.*discrepancy='none'"):
-        sheet(discrepancy="auto").ensemble(2)
+def test_draws_of_fibres_with_a_free_energy_spread_as_the_posterior_does():
+    posterior = sheet(discrepancy="auto", tolerances=tq.Tolerances("as-tested"))
+    draws = posterior.ensemble(256, admissible=False)
+    assert all(draw.discrepancy is not None and draw.continuation is None for draw in draws)
+    points = np.array([[1.25, 1.1], [1.1, 1.3], [1.2, 1.2]])
+    for channel, path in enumerate(tq.loading_modes()["biaxial"]().paths):
+        stress = draws.stress(path, points)
+        for draw, wanted in zip(draws[:4], stress, strict=False):
+            assert tq.engineering_stress(draw, path, points, ()) == pytest.approx(wanted, rel=1e-9)
+        band = posterior.predict(points, channel=channel, noise=False, prob=0.8)
+        width = (band["high"] - band["low"]).to_numpy().ravel()
+        low, median, high = np.quantile(stress, [0.1, 0.5, 0.9], axis=0)
+        assert median == pytest.approx(band["median"].to_numpy().ravel(), abs=0.15 * width.max())
+        assert high - low == pytest.approx(width, rel=0.25)
 
 
 def test_draws_of_two_posteriors_are_paired_at_random_once_one_is_shuffled():

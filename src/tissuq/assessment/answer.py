@@ -279,12 +279,17 @@ def _simulating(
     model = solution.model
     if not model.discrepancy.is_energy:
         return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' is an error of the stress and no material"
-    if not model.material.is_isotropic and model.energy_symbols:
-        return Verdict.NO, "fibres with an energy discrepancy are no material of a finite-element code"
     if (solution.direction_probability or 0.0) > PROBABLE_DIRECTION:
         return Verdict.NO, "the tissue has a preferred direction, and draws as materials have none"
     if "unmodelled-curve" in codes:
         return Verdict.NO, "the fitted curve departs from the measured one"
+    if not model.material.is_isotropic and model.energy_symbols:
+        if len(set(model.experiment.states.paths)) == 1:
+            return (
+                Verdict.NO,
+                "one stress was measured, and neither fibres nor the free energy beside them follow from it",
+            )
+        return Verdict.CARE, "fibres beside a free energy have cards in FEBio alone, and need axes in the model"
     if not model.material.is_isotropic:
         return Verdict.CARE, "fibres have cards where a code has their law, and need axes in the model"
     if not ranges:

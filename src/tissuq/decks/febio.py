@@ -27,7 +27,7 @@ SETS = ("Nodes", "NodeSet", "Surface")
 SOLIDS = ("hex", "HEX", "tet", "TET", "penta", "PENTA", "pyra", "PYRA")
 """What the types of elements of a volume begin with."""
 FIBRES = "Holzapfel-Gasser-Ogden"
-"""The type of cards with fibres."""
+"""The type of fibres."""
 
 
 class FEBioDeck(DeckFormat):
@@ -66,7 +66,7 @@ class FEBioDeck(DeckFormat):
         start = TYPE.sub(lambda match: match[1] + kind[2], head, count=1)
         lines = block.partition("\n")[2].rstrip().splitlines()
         lines = [DENSITY.sub(lambda match: density, line) for line in lines]
-        if axes and kind[2].strip("\"'") == FIBRES:
+        if axes and FIBRES in block:
             lines.insert(-1, axes)
         return "\n".join([start, *(line for line in lines if line.strip())])
 

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import ClassVar
+from typing import ClassVar, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,20 @@ from tissuq.export.cards import (
 from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.fibres import FIBRE_AXES, FibreForm, fibre_sentences, initial_stiffness
 from tissuq.export.judgement import JudgedLaw
-from tissuq.export.laws import Form, Law, exact_law, sum_of, summands_of
+from tissuq.export.laws import (
+    Form,
+    Law,
+    exact_law,
+    fibres_among,
+    matrix_and_fibres,
+    parts_of,
+    sum_of,
+    summands_of,
+)
 from tissuq.export.projection import Projection, projections
 from tissuq.export.states import moduli
 from tissuq.mechanics import Material
+from tissuq.mechanics.laws import MaterialSum
 from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["Card", "FECode"]
@@ -152,28 +162,35 @@ class FECode(CardFormat):
         )
         return Cards(files, tuple(index), sentences, tuple(blocks), self.outside(all_cards))
 
-    def form_of(self, law: Law) -> Form | None:
-        """Return the first form that holds a law, if any."""
-        return next((form for form in self.forms if form.holds(law.material)), None)
+    def form_of(self, material: Material) -> Form | None:
+        """Return the first form that holds a material, if any."""
+        return next((form for form in self.forms if form.holds(material)), None)
 
     def _best_law(self, ensemble: Ensemble, settings: CardSettings) -> tuple[JudgedLaw, Sequence[JudgedLaw]]:
         """Return the law of the cards, and those of the code's other families where some cards are not near."""
-        law = exact_law(ensemble) if settings.law is None else None
-        form = self.form_of(law) if law is not None else None
-        draws = DrawStresses(ensemble)
-        if form is None and not ensemble[0].is_isotropic:
-            name = ensemble[0].parts[0][0].name
-            if settings.law is not None:
-                raise InputError(f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out.")
-            raise InputError(self._why_no_fibres(name, law))
-        if law is not None and form is not None:
-            return JudgedLaw.of(draws, law, form, None), ()
-        candidates = [self._projected(draws, projection) for projection in self._requested(settings)]
+        law = exact_law(ensemble)
+        form = self.form_of(law.material) if law is not None else None
+        if law is not None and form is not None and settings.law is None:
+            return JudgedLaw.of_draws(ensemble, law, form), ()
+        matrix, fibres = matrix_and_fibres(ensemble)
+        families = self._families(fibres)
+        if not families:
+            self._refuse_fibres(ensemble, settings)
+        draws = DrawStresses(matrix)
+        requested = self._requested(settings, families)
+        candidates = [self._projected(draws, projection, fibres) for projection in requested]
         best = min(candidates, key=lambda judged: judged.rank)
         rivals = [judged for judged in candidates if judged is not best]
         if settings.law is not None and not best.is_near.all():
-            rivals = [self._projected(draws, other) for other in self.projections if other != best.projection]
+            rivals = [self._projected(draws, other, fibres) for other in families if other != best.projection]
         return best, rivals
+
+    def _families(self, fibres: Law | None) -> Sequence[Projection]:
+        """Return the projections that the code has, beside fibres where there are some."""
+        if fibres is None:
+            return self.projections
+        sums = {projection: MaterialSum.of(projection.material, fibres.material) for projection in self.projections}
+        return [projection for projection, material in sums.items() if self.form_of(material) is not None]
 
     def check_has_card(self, material: Material) -> None:
         """Refuse a material with fibres that has no card here, whatever its values are.
@@ -183,14 +200,34 @@ class FECode(CardFormat):
         InputError
             Which names the codes that have one.
         """
-        law = sum_of(list(summands_of(material, np.ones((1, len(material.parameters))))))
-        if law is None or self.form_of(law) is None:
-            raise InputError(self._why_no_fibres(material.name, law))
+        summands = list(summands_of(material, np.ones((1, len(material.parameters)))))
+        law, fibres = sum_of(summands), fibres_among(summands)
+        if not self._has_card(law, fibres):
+            raise InputError(self._why_no_card(material.name, law, fibres))
 
-    def _why_no_fibres(self, name: str, law: Law | None) -> str:
-        """Return why a law with fibres has no card here, and which codes have one."""
+    def _has_card(self, law: Law | None, fibres: Law | None) -> bool:
+        """Return whether draws have a card that are a law, or none, and have fibres, or none."""
+        return (law is not None and self.form_of(law.material) is not None) or bool(self._families(fibres))
+
+    def _refuse_fibres(self, ensemble: Ensemble, settings: CardSettings) -> NoReturn:
+        """Refuse draws with fibres that have no card here, or none of the law that is asked for."""
+        name, parts = ensemble[0].parts[0][0].name, list(parts_of(ensemble))
+        law, alone = exact_law(ensemble), sum_of(parts)
+        has_form = alone is not None and self.form_of(alone.material) is not None
+        if has_form and law is not None and settings.law is not None:
+            raise InputError(f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out.")
+        reason = self._why_no_card(name, law, fibres_among(parts))
+        if has_form:
+            reason += (
+                " Or fit without the free energy of the discrepancy beside the fibres (--discrepancy none, in Python "
+                "discrepancy='none'), or take FElupe, which has all of it (tissuq.finite_elements.FElupeMaterial)."
+            )
+        raise InputError(reason)
+
+    def _why_no_card(self, name: str, law: Law | None, fibres: Law | None) -> str:
+        """Return why draws with fibres, of a law or none, have no card here, and which codes have one."""
         codes = [kind() for kind in card_formats().values()]
-        able = sorted(code.name for code in codes if law and isinstance(code, FECode) and code.form_of(law))
+        able = sorted(code.name for code in codes if isinstance(code, FECode) and code._has_card(law, fibres))
         advice = (
             f"write cards for {' or '.join(able)}."
             if able
@@ -199,29 +236,30 @@ class FECode(CardFormat):
         )
         return f"material '{name}' has no card for {self.name} ({self.fibres}): {advice}"
 
-    def _projected(self, draws: DrawStresses, projection: Projection) -> JudgedLaw:
+    def _projected(self, draws: DrawStresses, projection: Projection, fibres: Law | None) -> JudgedLaw:
         law = projection.law(draws)
-        form = self.form_of(law)
+        whole = law if fibres is None else law.plus(fibres)
+        form = self.form_of(whole.material)
         if form is None:
             raise InputError(f"{self.name} has no form for {law.material.name}; ask for another order.")
-        return JudgedLaw.of(draws, law, form, projection)
+        return JudgedLaw.of_projection(draws, projection, law, whole, form)
 
-    def _requested(self, settings: CardSettings) -> Sequence[Projection]:
+    def _requested(self, settings: CardSettings, families: Sequence[Projection]) -> Sequence[Projection]:
+        """Return the projections among which that of the cards is chosen."""
         if settings.law is None:
-            return self.projections
-        kinds = {projection.family: projection for projection in self.projections}
+            return families
+        kinds = {projection.family: projection for projection in families}
         if settings.law not in kinds:
-            families = ", ".join(kinds)
             unknown = "" if settings.law in projections() else f"there is no law '{settings.law}'; "
-            raise InputError(f"{unknown}cards for {self.name} can be of the laws {families}.")
+            raise InputError(f"{unknown}cards for {self.name} can be of the laws {', '.join(kinds)}.")
         projection = kinds[settings.law]
         return [projection if settings.order is None else type(projection).of_order(settings.order)]
 
     def _law_lines(self, judged: JudgedLaw, settings: CardSettings) -> Iterator[str]:
-        has_fibres = isinstance(judged.form, FibreForm)
-        invariants = "I1, I4" if has_fibres else "I1, I2, l"
-        yield f"form: {judged.form.keyword}, W = {judged.form.formula}; {invariants} of the isochoric part, l / J^(1/3)"
-        volumetric = (has_fibres and self.fibre_volumetric) or self.volumetric
+        form, has_fibres = judged.form, not judged.law.material.is_isotropic
+        of_stretches = "I1, I4" if isinstance(form, FibreForm) else "I1, I2, I4, l" if has_fibres else "I1, I2, l"
+        yield f"form: {form.keyword}, W = {form.formula}; {of_stretches} of the isochoric part, l / J^(1/3)"
+        volumetric = (isinstance(form, FibreForm) and self.fibre_volumetric) or self.volumetric
         yield f"volume: U = {volumetric}; K is the bulk modulus"
         if has_fibres:
             yield FIBRE_AXES

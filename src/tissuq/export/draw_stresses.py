@@ -102,9 +102,12 @@ class DrawStresses:
 
     @cached_property
     def of_modes(self) -> dict[str, Judged]:
-        """The stresses of every loading mode of one stretch over the range that was measured, by its name."""
+        """The stresses of every loading mode of one stretch over the range that was measured, by its name.
+
+        None beside fibres, which leave open how a body deforms in these modes.
+        """
         judged = {}
-        for mode in curve_modes():
+        for mode in (mode for mode in curve_modes() if mode.name in self.ensemble.ranges):
             stretch = mode_stretches(*self.ensemble.ranges[mode.name])
             of_unit_modulus = np.abs(0.5 * invariant_rates(mode.at(stretch))[0])
             judged[mode.name] = self._judged(mode, stretch, of_unit_modulus)

@@ -8,7 +8,7 @@ from math import cos, degrees, pi, sin
 
 from tissuq.errors import InputError
 from tissuq.export.cards import Cards
-from tissuq.export.laws import Constants, Form
+from tissuq.export.laws import Constants, Form, MixtureForm
 from tissuq.mechanics import FibreMaterial, Material
 from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, MaterialSum, Rivlin, StandardFibres
 
@@ -20,6 +20,7 @@ __all__ = [
     "check_fibres",
     "directions",
     "fibre_sentences",
+    "fibres_of_form",
     "initial_stiffness",
 ]
 
@@ -50,6 +51,8 @@ class FibreForm(Form):
         Whether the fibres must lie along axis 1.
     matrix : (str, float)
         What the code calls the constant of the matrix, and that over C10.
+    has_matrix : bool
+        Whether the material has a matrix; in a sum with others that constant is zero.
     share : float
         The code's k1 over that of a family.
     """
@@ -58,32 +61,46 @@ class FibreForm(Form):
     has_dispersion: bool = True
     only_along_axis: bool = False
     matrix: tuple[str, float] = ("C10", 1.0)
+    has_matrix: bool = True
     share: float = 1.0
 
     def holds(self, material: Material) -> bool:
-        if not isinstance(material, MaterialSum) or len(material.summands) != 2:
-            return False
-        matrix, fibres = material.summands
-        if not isinstance(matrix, Rivlin) or matrix.terms != ("C10",) or not isinstance(fibres, FibreMaterial):
+        *matrix, fibres = _summands(material)
+        is_neo_hookean = [isinstance(summand, Rivlin) and summand.terms == ("C10",) for summand in matrix]
+        if is_neo_hookean != [True] * self.has_matrix or not isinstance(fibres, FibreMaterial):
             return False
         kinds = (StandardFibres, ExponentialFibres, *[DispersedFibres] * self.has_dispersion)
         is_placed = fibres.degrees == 0 or not self.only_along_axis
         return isinstance(fibres, kinds) and fibres.families == self.families and is_placed
 
     def constants(self, material: Material, values: Sequence[float]) -> Constants:
-        assert isinstance(material, MaterialSum)  # noqa: S101 (what it holds)
-        fibres = material.summands[1]
-        assert isinstance(fibres, FibreMaterial)  # noqa: S101
-        named = dict(zip((parameter.symbol for parameter in fibres.parameters), values[1:], strict=True))
+        fibres = _summands(material)[-1]
+        assert isinstance(fibres, FibreMaterial)  # noqa: S101 (what it holds)
+        of_fibres = values[int(self.has_matrix) :]
+        named = dict(zip((parameter.symbol for parameter in fibres.parameters), of_fibres, strict=True))
         name, factor = self.matrix
         constants = {
-            name: factor * values[0],
+            name: factor * values[0] if self.has_matrix else 0.0,
             "k1": self.share * named.get("k1", named.get("k", 0.0)),
             "k2": named.get("k2", QUADRATIC_RATE),
         }
         if self.has_dispersion:
             constants["kappa"] = named.get("kappa", 0.0)
         return constants | {"degrees": degrees(named["phi"]) if fibres.degrees is None else fibres.degrees}
+
+
+def fibres_of_form(form: Form, constants: Constants) -> tuple[FibreForm, Constants] | None:
+    """Return what of a form is fibres, with its constants; None where nothing is."""
+    if isinstance(form, FibreForm):
+        return form, constants
+    if not isinstance(form, MixtureForm):
+        return None
+    fibres = (summand for summand in form.summands if isinstance(summand, FibreForm))
+    return next(((summand, form.of_summand(summand, constants)) for summand in fibres), None)
+
+
+def _summands(material: Material) -> tuple[Material, ...]:
+    return material.summands if isinstance(material, MaterialSum) else (material,)
 
 
 def directions(form: FibreForm, constants: Mapping[str, float]) -> list[tuple[float, float]]:
@@ -97,7 +114,10 @@ def initial_stiffness(form: Form, constants: Constants) -> float:
 
     Added to the matrix's shear modulus it is the one on whose scale the bulk modulus is large.
     """
-    return 4 / 3 * constants["k1"] / form.share * form.families if isinstance(form, FibreForm) else 0.0
+    if (fibres := fibres_of_form(form, constants)) is None:
+        return 0.0
+    fibre_form, of_fibres = fibres
+    return 4 / 3 * of_fibres["k1"] / fibre_form.share * fibre_form.families
 
 
 def check_fibres(name: str, cards: Cards) -> None:
@@ -120,13 +140,14 @@ def check_fibres(name: str, cards: Cards) -> None:
 
 def fibre_sentences(form: Form, constants: Sequence[Constants]) -> Iterator[str]:
     """Return what the user must read of cards with fibres."""
-    if not isinstance(form, FibreForm):
+    of_fibres = [fibres[1] for draw in constants if (fibres := fibres_of_form(form, draw))]
+    if not of_fibres:
         return
     yield (
         "Fibres lie from axis 1 of the test towards its axis 2, axes of the material's orientation in the model: give "
         "the section one whose first axis is axis 1 of the test. Every file says where its fibres lie."
     )
-    if any(draw["k2"] == QUADRATIC_RATE for draw in constants):
+    if any(draw["k2"] == QUADRATIC_RATE for draw in of_fibres):
         yield (
             f"Quadratic fibres are written as exponential ones with k2 = {QUADRATIC_RATE:g}, whose stress is larger by "
             f"{QUADRATIC_RATE:g} (I4 - 1)^2, relative to it."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import starmap
 from math import sqrt
 from typing import Any, ClassVar
@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from tissuq.errors import InputError
 from tissuq.export.code import Card, FECode
 from tissuq.export.fibres import CALCULIX_PREFIX, FibreForm, directions
-from tissuq.export.laws import Constants, Form, LibraryForm, OgdenForm, PolynomialForm
+from tissuq.export.laws import Form, LibraryForm, MixtureForm, OgdenForm, PolynomialForm
 from tissuq.export.projection import (
     MixtureFit,
     OgdenFit,
@@ -22,8 +22,7 @@ from tissuq.export.projection import (
     full_terms,
     reduced_terms,
 )
-from tissuq.mechanics import Material
-from tissuq.mechanics.laws import Gent, MaterialSum, VanDerWaals, VerondaWestmann
+from tissuq.mechanics.laws import Gent, VanDerWaals, VerondaWestmann
 
 __all__ = ["Abaqus", "Ansys", "CalculiX", "FEBio", "LSDyna"]
 
@@ -75,7 +74,7 @@ class Abaqus(FECode):
         ),
         *(FibreForm(f"HOLZAPFEL, LOCAL DIRECTIONS={n}", f"C10 (I1 - 3) + {DISPERSED}", n) for n in (1, 2)),
     )
-    fibres = "it has fibres of one kind in a neo-Hookean matrix"
+    fibres = "it has fibres of one kind in a neo-Hookean matrix, with nothing beside"
     fibre_volumetric = "((J^2 - 1)/2 - ln J) / D, D = 2/K"
     projections: ClassVar[tuple[Projection, ...]] = (
         PolynomialFit(full_terms(4)),
@@ -128,7 +127,7 @@ class CalculiX(Abaqus):
         *_abaqus_forms(3, 3),
         *(FibreForm(f"{CALCULIX_PREFIX}, {n} of them", f"C10 (I1 - 3) + {FIBRES}", n, False) for n in (1, 2)),
     )
-    fibres = "it has fibres without dispersion in a neo-Hookean matrix"
+    fibres = "it has fibres without dispersion in a neo-Hookean matrix, with nothing beside"
     fibre_volumetric = volumetric
     projections = PolynomialFit(full_terms(3)), OgdenFit(3), ReducedFit(reduced_terms(3))
     absent_d = 1e20
@@ -220,37 +219,27 @@ class Ansys(FECode):
         return "".join(f"{line}\n" for line in lines)
 
 
-@dataclass(frozen=True)
-class Mixture(Form):
-    """A sum of materials, each as a form writes it."""
-
-    summands: tuple[Form, ...]
-
-    def holds(self, material: Material) -> bool:
-        if not isinstance(material, MaterialSum) or len(material.summands) != len(self.summands):
-            return False
-        return all(form.holds(summand) for form, summand in zip(self.summands, material.summands, strict=True))
-
-    def constants(self, material: Material, values: Sequence[float]) -> Constants:
-        assert isinstance(material, MaterialSum)  # noqa: S101 (what it holds)
-        constants: Constants = {}
-        remaining = list(values)
-        for form, summand in zip(self.summands, material.summands, strict=True):
-            count = len(summand.parameters)
-            numbers, remaining = form.constants(summand, remaining[:count]), remaining[count:]
-            constants |= {f"{form.keyword}_{name}": value for name, value in numbers.items()}
-        return constants
-
-
 FEBIO_YEOH = PolynomialForm(
     "Yeoh", "sum of c_i (I1 - 3)^i", reduced_terms(FEBIO_TERMS), tuple(f"c{n}" for n in range(1, FEBIO_TERMS + 1))
 )
 FEBIO_OGDEN = OgdenForm(
     "Ogden", "sum of c_i/m_i^2 (l1^m_i + l2^m_i + l3^m_i - 3)", 1, FEBIO_TERMS, lambda mu, alpha: 2 * mu, ("c", "m")
 )
-FEBIO_MIXTURE = Mixture(
-    "uncoupled solid mixture", f"{FEBIO_YEOH.formula} (Yeoh) + {FEBIO_OGDEN.formula} (Ogden)", (FEBIO_YEOH, FEBIO_OGDEN)
-)
+
+
+def _febio_fibres(*, has_matrix: bool) -> tuple[FibreForm, FibreForm]:
+    """Return two families of fibres, and one as two at no angle, with a neo-Hookean matrix or without."""
+    name, formula = "Holzapfel-Gasser-Ogden", f"c/2 (I1 - 3) + {DISPERSED}" if has_matrix else DISPERSED
+    both = FibreForm(name, formula, 2, matrix=("c", 2.0), has_matrix=has_matrix)
+    halved = f"{formula}, two families at no angle, each with half of k1"
+    return both, replace(both, formula=halved, families=1, only_along_axis=True, share=0.5)
+
+
+def _febio_mixture(*fibres: FibreForm) -> MixtureForm:
+    """Return a polynomial of I1 and an Ogden sum added, with fibres or without."""
+    summands = FEBIO_YEOH, FEBIO_OGDEN, *fibres
+    formula = " + ".join(f"{form.formula} ({form.keyword})" for form in summands)
+    return MixtureForm("uncoupled solid mixture", formula, summands)
 
 
 class FEBio(FECode):
@@ -277,34 +266,22 @@ class FEBio(FECode):
             VerondaWestmann,
             lambda mu, b: {"c1": mu / b, "c2": b},
         ),
-        FEBIO_MIXTURE,
-        FibreForm("Holzapfel-Gasser-Ogden", f"c/2 (I1 - 3) + {DISPERSED}", 2, matrix=("c", 2.0)),
-        FibreForm(
-            "Holzapfel-Gasser-Ogden",
-            f"c/2 (I1 - 3) + {DISPERSED}, two families at no angle, each with half of k1",
-            1,
-            only_along_axis=True,
-            matrix=("c", 2.0),
-            share=0.5,
-        ),
+        _febio_mixture(),
+        *_febio_fibres(has_matrix=True),
+        *(_febio_mixture(fibres) for fibres in _febio_fibres(has_matrix=False)),
     )
-    fibres = "it has two families of one kind in a neo-Hookean matrix, or one along axis 1 (:one@0)"
+    fibres = "it has two families of one kind, or one along axis 1 (:one@0)"
     fibre_volumetric = "((J^2 - 1)/2 - ln J) K/2"
     projections = MixtureFit(FEBIO_TERMS), OgdenFit(FEBIO_TERMS), ReducedFit(reduced_terms(FEBIO_TERMS))
 
     def text(self, card: Card) -> str:
         head = f'    <material id="{card.number}" name={quoteattr(card.name)} type="{card.form.keyword}">'
         lines = [head, _element("density", card.water_density)]
-        if isinstance(card.form, FibreForm):
-            named = {"gamma" if name == "degrees" else name: number for name, number in card.constants.items()}
-            lines += starmap(_element, {**named, "k": card.bulk}.items())
-        elif isinstance(card.form, Mixture):
+        if isinstance(card.form, MixtureForm):
             lines.append(_element("k", card.bulk))
             for solid_form in card.form.summands:
-                prefix = f"{solid_form.keyword}_"
-                names = [name for name in card.constants if name.startswith(prefix)]
-                numbers = {name.removeprefix(prefix): card.constants[name] for name in names}
-                solid = (f"  {_element(name, number)}" for name, number in numbers.items())
+                constants = card.form.of_summand(solid_form, card.constants)
+                solid = (f"  {element}" for element in starmap(_element, constants.items()))
                 lines += [f'      <solid type="{solid_form.keyword}">', *solid, "      </solid>"]
         else:
             lines += starmap(_element, {**card.constants, "k": card.bulk}.items())
@@ -316,7 +293,8 @@ class FEBio(FECode):
 
 
 def _element(name: str, number: float) -> str:
-    return f"      <{name}>{number:.10e}</{name}>"
+    tag = "gamma" if name == "degrees" else name
+    return f"      <{tag}>{number:.10e}</{tag}>"
 
 
 class LSDyna(FECode):

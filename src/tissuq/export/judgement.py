@@ -14,6 +14,7 @@ from tissuq.export.nearest_law import WANTED_ERROR
 from tissuq.export.projection import Projection
 from tissuq.export.states import are_stable
 from tissuq.posterior.draws_in_words import named_draws
+from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["JudgedLaw"]
 
@@ -35,7 +36,7 @@ class JudgedLaw:
     projection : Projection or None
         That it is of; None where it is the draws' own law.
     errors : mapping of str to (N, n) array
-        As `DrawStresses.errors` returns them; none of fibres, of which no law is projected.
+        As `DrawStresses.errors` returns them, of all but the fibres, which are exact; none of a law that is the draws'.
     stable, stable_beyond : (N,) arrays of bool
         Over the range that was measured, and up to the last of `REACHES`.
     """
@@ -48,12 +49,16 @@ class JudgedLaw:
     stable_beyond: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, draws: DrawStresses, law: Law, form: Form, projection: Projection | None) -> JudgedLaw:
-        """Return the judgement of a law in the place of draws."""
-        cards = law.ensemble(draws.ensemble)
-        stable = are_stable(cards), are_stable(cards, REACHES[-1])
-        errors = draws.errors(cards) if law.material.is_isotropic else {}
-        return cls(law, form, projection, errors, *stable)
+    def of_draws(cls, ensemble: Ensemble, law: Law, form: Form) -> JudgedLaw:
+        """Return the judgement of the law that draws are."""
+        errors = DrawStresses(ensemble).errors(law.ensemble(ensemble)) if law.material.is_isotropic else {}
+        return cls(law, form, None, errors, *_stable(law, ensemble))
+
+    @classmethod
+    def of_projection(cls, draws: DrawStresses, projection: Projection, law: Law, whole: Law, form: Form) -> JudgedLaw:
+        """Return the judgement of a projection in the place of draws, and as a whole with fibres beside it."""
+        errors = draws.errors(law.ensemble(draws.ensemble))
+        return cls(whole, form, projection, errors, *_stable(whole, draws.ensemble))
 
     @property
     def is_near(self) -> NDArray[np.bool_]:
@@ -78,7 +83,10 @@ class JudgedLaw:
         if self.projection is None:
             yield "the card's law is the draw's own, exactly"
         else:
-            yield "PROJECTION: the card is the nearest of its form; relative error of stress, largest and rms:"
+            yield (
+                f"PROJECTION: the card is the nearest of its form; relative error of stress{self._beside_fibres}, "
+                "largest and rms:"
+            )
             for name, error in self.errors.items():
                 yield f"    {_label(name)}: {_percent(_largest(error[draw]))}, {_percent(_rms(error[draw]))}"
             if not self.is_near[draw]:
@@ -95,7 +103,7 @@ class JudgedLaw:
         else:
             yield (
                 f"The draws' own law has no card in {code}, so every card is the nearest {self.form.keyword}: its "
-                "stresses differ from the draw's by (root mean square; largest, of all draws) "
+                f"stresses{self._beside_fibres} differ from the draw's by (root mean square; largest, of all draws) "
                 + "; ".join(
                     f"{_label(name)} {_percent(_rms(error))}, {_percent(_largest(error))}"
                     for name, error in self.errors.items()
@@ -105,6 +113,10 @@ class JudgedLaw:
             )
             yield from self._far_cards(rivals)
         yield from self._unstable_cards()
+
+    @property
+    def _beside_fibres(self) -> str:
+        return "" if self.law.material.is_isotropic else " (all but that of the fibres, which is exact)"
 
     def _far_cards(self, rivals: Sequence[JudgedLaw]) -> Iterator[str]:
         far = np.flatnonzero(~self.is_near)
@@ -119,7 +131,8 @@ class JudgedLaw:
                 f"{int(best.is_near.sum())} of all would be within it"
             )
         else:
-            way = "none of this code's other laws is nearer to more of them; --format table is exact"
+            exact = "--format table" if self.law.material.is_isotropic else "tissuq.finite_elements.FElupeMaterial"
+            way = f"none of this code's other laws is nearer to more of them; {exact} is exact"
         yield (
             f"The cards of {named_draws(far)} of {len(self.stable)} are more than {_percent(WANTED_ERROR)} off in some "
             f"measured state: {way}."
@@ -138,6 +151,12 @@ class JudgedLaw:
                 f"The cards of {named_draws(lost)} are not stable up to {REACHES[-1]:g} times the measured invariants: "
                 "a model that goes so far may stop there."
             )
+
+
+def _stable(law: Law, like: Ensemble) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return whether draws of a law in the place of others are stable, as measured and up to the last of `REACHES`."""
+    cards = law.ensemble(like)
+    return are_stable(cards), are_stable(cards, REACHES[-1])
 
 
 def _largest(error: FloatArray) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -31,9 +32,12 @@ __all__ = [
     "Form",
     "Law",
     "LibraryForm",
+    "MixtureForm",
     "OgdenForm",
     "PolynomialForm",
     "exact_law",
+    "fibres_among",
+    "matrix_and_fibres",
     "parts_of",
     "sum_of",
     "summands_of",
@@ -68,6 +72,10 @@ class Law:
         draws = tuple(EnergyDraw(number, ((self.material, row),), None) for number, row in enumerate(rows))
         return replace(like, draws=draws)
 
+    def plus(self, law: Law) -> Law:
+        """Return the sum of both."""
+        return Law(MaterialSum.of(self.material, law.material), np.hstack([self.values, law.values]))
+
     def scaled(self, factor: float) -> Law:
         """Return the same law in a unit of stress of which one MPa is ``factor``."""
         is_stress = np.array([parameter.unit == "MPa" for parameter in self.material.parameters])
@@ -101,8 +109,24 @@ def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[M
     """Return the sum of a polynomial and fibres, if they are one."""
     if not all(isinstance(material, POLYNOMIALS) for material, _ in matrix):
         return None
-    laws = [_polynomial(matrix), *(Law(*law) for law in fibres)]
-    return Law(MaterialSum.of(*(law.material for law in laws)), np.hstack([law.values for law in laws]))
+    return reduce(Law.plus, [Law(*law) for law in fibres], _polynomial(matrix))
+
+
+def matrix_and_fibres(ensemble: Ensemble) -> tuple[Ensemble, Law | None]:
+    """Return draws without their fibres, discrepancy included, and the sum of these, if there are any."""
+    summands = list(parts_of(ensemble))
+    matrix = [summand for summand in summands if summand[0].is_isotropic]
+    draws = (
+        replace(draw, parts=tuple((material, tuple(values[row])) for material, values in matrix))
+        for row, draw in enumerate(ensemble)
+    )
+    return replace(ensemble, draws=tuple(draws)), fibres_among(summands)
+
+
+def fibres_among(summands: list[tuple[Material, FloatArray]]) -> Law | None:
+    """Return the sum of the fibres among materials with values (N, k), if there are any."""
+    fibres = [Law(*summand) for summand in summands if not summand[0].is_isotropic]
+    return reduce(Law.plus, fibres) if fibres else None
 
 
 def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:
@@ -241,3 +265,27 @@ class LibraryForm(Form):
 
     def constants(self, material: Material, values: Sequence[float]) -> Constants:
         return self.convert(*values)
+
+
+@dataclass(frozen=True)
+class MixtureForm(Form):
+    """A sum of materials, each as a form writes it; its constants have the keyword of theirs before their names."""
+
+    summands: tuple[Form, ...]
+
+    def holds(self, material: Material) -> bool:
+        if not isinstance(material, MaterialSum) or len(material.summands) != len(self.summands):
+            return False
+        return all(form.holds(summand) for form, summand in zip(self.summands, material.summands, strict=True))
+
+    def constants(self, material: Material, values: Sequence[float]) -> Constants:
+        constants: Constants = {}
+        for form, (summand, numbers) in zip(self.summands, summands_of(material, np.array([values])), strict=True):
+            of_summand = form.constants(summand, tuple(map(float, numbers[0])))
+            constants |= {f"{form.keyword}_{name}": value for name, value in of_summand.items()}
+        return constants
+
+    def of_summand(self, form: Form, constants: Mapping[str, float]) -> Constants:
+        """Return the constants of one summand, by the names that its form gives them."""
+        prefix = f"{form.keyword}_"
+        return {name.removeprefix(prefix): value for name, value in constants.items() if name.startswith(prefix)}

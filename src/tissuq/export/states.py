@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.stability import stability_modes, stable_draws
 from tissuq.experiments.modes import Deformation, Path, SimpleShear
-from tissuq.export.laws import parts_of
+from tissuq.export.laws import matrix_and_fibres
 from tissuq.mechanics.arithmetic import exp, library
-from tissuq.posterior.ensemble import EnergyDraw, Ensemble
+from tissuq.posterior.ensemble import Ensemble
 
 __all__ = [
     "ANGLES",
@@ -115,11 +115,8 @@ def mode_stretches(low: float, high: float) -> FloatArray:
 
 def moduli(ensemble: Ensemble) -> FloatArray:
     """Return the initial shear moduli (N,) of draws, MPa, to which energy discrepancies and fibres add nothing."""
-    without_discrepancy = tuple(replace(draw, discrepancy=None, continuation=None) for draw in ensemble)
-    if not ensemble[0].is_isotropic:
-        parts = [part for part in parts_of(ensemble) if part[0].is_isotropic]
-        matrices = (tuple((material, tuple(values[row])) for material, values in parts) for row in range(len(ensemble)))
-        without_discrepancy = tuple(EnergyDraw(number, matrix, None) for number, matrix in enumerate(matrices))
+    matrix, _ = matrix_and_fibres(ensemble)
+    without_discrepancy = tuple(replace(draw, discrepancy=None, continuation=None) for draw in matrix)
     return initial_slope(replace(ensemble, draws=without_discrepancy).stress(SimpleShear(), SHEARS).T)
 
 

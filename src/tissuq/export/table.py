@@ -43,7 +43,7 @@ class Table(CardFormat):
         if not ensemble[0].is_isotropic:
             raise InputError(
                 f"material '{ensemble[0].parts[0][0].name}' has fibres, and W1 and W2 do not tell its stress: write "
-                "cards for a finite-element code, such as calculix or abaqus."
+                "cards for a finite-element code, such as febio or calculix."
             )
         states = SeenStates(ensemble.most, ANGLES)
         stress = ensemble.stress(states, states.points) * settings.factor

@@ -52,8 +52,8 @@ MOST_TRIES = 64
 class EnergyDraw(StretchMaterial):
     """One draw of a posterior as a material without free parameters.
 
-    Beyond the range of the data of its discrepancy, its energy goes on along rays (`tissuq.mechanics.rays`). A material
-    with fibres has no such discrepancy, and an energy of the deformation, not of the stretches alone.
+    Beyond the range of the data of its discrepancy, its energy goes on along rays (`tissuq.mechanics.rays`). With
+    fibres it does not, and its energy is one of the deformation, not of the stretches alone.
 
     Attributes
     ----------
@@ -112,7 +112,8 @@ class EnergyDraw(StretchMaterial):
     def energy_of(self, deformation: Deformation, values: Any = ()) -> Any:
         if self.is_isotropic:
             return self.energy(deformation.stretches)
-        return sum(material.energy_of(deformation, parameters) for material, parameters in self.parts)
+        energy = sum(material.energy_of(deformation, parameters) for material, parameters in self.parts)
+        return energy if self.discrepancy is None else energy + self.discrepancy(deformation.stretches)
 
     def why_not(self, deformation: Deformation) -> str:
         return next(filter(None, (material.why_not(deformation) for material, _ in self.parts)), "")
@@ -270,7 +271,7 @@ def drawn_ensemble(
     Parameters
     ----------
     solution : Solution
-        Of a discrepancy that is an energy (of an isotropic material), has none, or adds the terms of another material.
+        Of a discrepancy that is an energy, has none, or adds the terms of another material.
         Of an average, energies with a preferred direction are left out.
     count : int
     seed : int
@@ -292,10 +293,11 @@ def drawn_ensemble(
     modes, draws, tried = stability_modes(model.material), list[EnergyDraw](), 0
     while len(draws) < count:
         if tried >= MOST_TRIES * count:
+            in_fit = "require stability in the fit (--stable-in all, in Python stable_in='all'), "
             raise ModelError(
                 f"only {len(draws)} of {tried} draws are stable over the measured range of every loading mode, and "
-                f"{count} are wanted: require stability in the fit (--stable-in all, in Python stable_in='all'), "
-                "choose another material, or take all draws (--all-draws, in Python admissible=False)."
+                f"{count} are wanted: {in_fit if model.material.is_isotropic else ''}choose another material, or take "
+                "all draws (--all-draws, in Python admissible=False)."
             )
         batch = _materials(solution, count, [seed, tried // count], sampling)
         stable = all_isotropic
@@ -369,11 +371,6 @@ def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> Non
     check_seed(seed)
     if sampling not in get_args(Sampling):
         raise InputError(f"sampling must be one of {', '.join(get_args(Sampling))}, not '{sampling}'.")
-    if not model.material.is_isotropic and model.energy_symbols:
-        raise ModelError(
-            f"material '{model.material.name}' has fibres, and draws with an energy discrepancy are materials that no "
-            "finite-element program knows: fit without it (--discrepancy none, in Python discrepancy='none')."
-        )
     if not model.discrepancy.is_energy:
         raise ModelError(
             f"discrepancy '{model.discrepancy.name}' is an error of the measured stress and no material: fit with one "

@@ -434,8 +434,7 @@ class Posterior(PosteriorPlots):
         Raises
         ------
         InputError, ModelError
-            When the discrepancy is an error of the stress, it is an energy and the material has fibres, or hardly any
-            draw is stable.
+            When the discrepancy is an error of the stress, or hardly any draw is stable.
 
         Examples
         --------
