@@ -336,15 +336,16 @@ def test_a_new_patient_under_an_energy_is_predicted_in_every_mode():
         found.new_patient([[1.1, 1.1]], mode="biaxial")
 
 
-def test_errors_of_the_specimens_tests_are_no_spread_between_them():
-    """Well measured but for 10 % of the stress as a whole, against a sum over m and tau for Gaussians."""
+@pytest.mark.parametrize("error", [0.1, 0.25])
+def test_errors_of_the_specimens_tests_are_no_spread_between_them(error):
+    """Well measured but for a share of the stress as a whole, against a sum over m and tau for Gaussians."""
     moduli = np.array([0.4, 0.5, 0.6, 0.45, 0.55, 0.48])
-    found = neo_hookean(specimens_of(moduli, 0.002), 0.002, tolerances=tq.Tolerances(stress=0.1))
+    found = neo_hookean(specimens_of(moduli, 0.002), 0.002, tolerances=tq.Tolerances(stress=error))
     y = np.log(moduli)
     m, tau = np.median(y) + np.linspace(-1, 1, 401)[:, None], np.geomspace(1e-3, 5, 400)
     log_post = norm.logpdf(tau) + np.log(tau)
     for each in y:
-        log_post = log_post + norm.logpdf(each, m, np.hypot(tau, 0.1))
+        log_post = log_post + norm.logpdf(each, m, np.hypot(tau, error))
     weights = np.exp(log_post - log_post.max())
     weights /= weights.sum()
     line = found.coordinates.centre[0]
@@ -354,7 +355,7 @@ def test_errors_of_the_specimens_tests_are_no_spread_between_them():
         assert abs(draws.mean() - mean) < 4 * scale / np.sqrt(1000)
         assert abs(draws.std() / scale - 1) < 0.15
     own = found.posteriors["s0"].marginals["C10"]
-    assert own.sd / own.mean == pytest.approx(0.1, rel=0.02)
+    assert own.sd / own.mean == pytest.approx(error, rel=0.02)
     assert not found.complete.model.tolerances
 
 

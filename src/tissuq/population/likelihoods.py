@@ -174,14 +174,20 @@ def on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
 
 
 def _with_common_error(mixture: GaussianMixture, solution: Solution, coordinates: Coordinates) -> GaussianMixture:
-    """Return Gaussians on the line with the error that all stresses of a specimen share, to first order."""
+    """Return Gaussians on the line with the error that all stresses of a specimen share, to first order.
+
+    It widens the likelihood, which is the posterior over the slope of its prior on the line (`_under`): so the
+    posterior moves by as much as this slope pulls at what is added.
+    """
     error, columns = solution.model.common_error, solution.model.column_symbols
     if not error:
         return mixture
     along = np.where(coordinates.is_log, 1.0, mixture.mean + coordinates.centre)
     along = error * along * np.isin(coordinates.symbols, columns)
     covariance = mixture.covariance + along[:, :, None] * along[:, None, :]
-    return GaussianMixture.of_covariances(mixture.weights, mixture.mean, covariance)
+    pulled = along @ coordinates.is_log
+    weights = mixture.weights * np.exp(0.5 * pulled**2)
+    return GaussianMixture.of_covariances(weights, mixture.mean + pulled[:, None] * along, covariance)
 
 
 def _mapped(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMixture:
