@@ -169,6 +169,19 @@ def test_tests_that_no_spread_between_them_explains_give_no_modulus():
     assert verdicts(posterior)[0] == Verdict.NO
 
 
+def test_two_directions_of_one_specimen_that_differ_by_a_factor_give_no_modulus():
+    """They tell a spread between tests that would explain it, which tests of one specimen do not have."""
+    stretch = np.linspace(1.02, 1.3, 15)
+    strips = [
+        tq.simulate("demiray", {"mu": mu, "b": 4.0}, stretch, noise_sd=2e-4, seed=seed).labelled(specimen="S1")
+        for seed, mu in enumerate((0.04, 0.014))
+    ]
+    posterior = tq.fit(strips)
+    (warning,) = (warning for warning in posterior.warnings if warning.code == "tests-apart")
+    assert "that tests of a specimen may have" in warning
+    assert verdicts(posterior)[0] == Verdict.NO
+
+
 def test_tests_that_differ_as_specimens_do_are_not_said_to_contradict_each_other():
     codes = {warning.code for warning in tq.fit(in_shear_and_tension(1.2)).warnings}
     assert not codes & {"tests-apart", "contradicting-tests"}

@@ -96,3 +96,17 @@ def test_a_stress_that_is_known_is_no_target(cli, run):
     said = cli("design", "run", *TESTS, "--target", "planar:1")
     assert said.status == 2
     assert "target 'planar:1': its value is known already" in said.err
+
+
+@pytest.mark.slow
+def test_a_run_of_several_tests_is_ranked(cli, here):
+    for mode, factor in (("uniaxial", 1.0), ("planar", 1.2)):
+        rows = "".join(f"{1 + 0.02 * k:.2f},{factor * 0.3 * k:.3f}\n" for k in range(1, 9))
+        (here / f"{mode}.csv").write_text(f"stretch,stress [kPa]\n{rows}")
+    words = ["--mode", "uniaxial", "--mode", "planar", "--no-figures", "--out", "both"]
+    assert cli("fit", "uniaxial.csv", "planar.csv", *words).status == 0
+    said = cli("design", "both", "--candidate", "equibiaxial 1.02:1.1 8", "--no-figures")
+    assert said.status == 0, said.err
+    assert "tissuq fit DATA.csv NEW.csv --estimand tissue" in " ".join(said.out.split())
+    assert "of the tissue" in said.out
+    assert "inaccurate" not in said.out

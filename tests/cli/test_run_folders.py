@@ -53,6 +53,18 @@ def test_a_folder_of_other_files_is_never_touched(cli, here, specimen, command, 
     assert tree(here) == before
 
 
+def test_what_another_command_made_is_not_replaced_with_force(cli, here, specimen):
+    assert cli("fit", specimen, "--discrepancy", "none", "--no-figures", "--out", "run").status == 0
+    assert cli("export", "run", "--draws", 2, "--out", "made").status == 0
+    before = sorted(path.name for path in (here / "made").iterdir())
+    for command in (("fit", specimen, "--no-figures"), ("design", "run", "--no-figures")):
+        said = cli(*command, "--out", "made", "--force")
+        assert said.status == 2
+        assert f"holds what tissuq export made, which --force of tissuq {command[0]} does not replace" in said.err
+    assert sorted(path.name for path in (here / "made").iterdir()) == before
+    assert cli("export", "run", "--draws", 3, "--out", "made", "--force").status == 0
+
+
 @pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png", "posterior/deep/er/mine.nc"])
 def test_files_that_someone_put_into_a_run_folder_are_not_deleted_by_force(cli, here, specimen, name):
     assert cli("fit", specimen, *ALONE).status == 0

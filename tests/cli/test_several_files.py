@@ -128,7 +128,10 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["tests/b.csv", "other.csv"], ["neither 'other.csv' nor its name says", "--mode once for each file"]),
+        (
+            ["tests/b.csv", "other.csv"],
+            ["neither 'other.csv' nor its name says", "--mode once for all files, or once for each"],
+        ),
         (
             ["tests/b.csv", "tests/uniaxial.csv", "--mode", "planar", "--mode", "planar", "--mode", "planar"],
             ["3 times"],

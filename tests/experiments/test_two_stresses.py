@@ -214,3 +214,13 @@ def test_an_inspection_tells_both_axes_and_what_is_strange_about_one(tmp_path):
     assert "stretch axis x: 1 to 1.3; axis y: 1 to 1.15" in text
     assert [note[:50] for note in inspection.warnings] == ["axis y: at stretch 1 the stress is already 5 kPa, "]
     assert len(inspection.noise_sds) == 2
+
+
+def test_an_axis_that_is_held_at_its_length_is_read(tmp_path):
+    path = tmp_path / "biaxial strip.csv"
+    path.write_text(
+        "stretch x,stretch y,stress x [kPa],stress y [kPa]\n1,1,0,0\n1.1,1,2.1,0.8\n1.2,1,4.5,1.7\n", encoding="utf-8"
+    )
+    data = read_experiment(path, mode="biaxial")
+    assert data.stretch.tolist() == [[1, 1], [1.1, 1], [1.2, 1]]
+    assert data.curves[1].stress.tolist() == [0, 0.8e-3, 1.7e-3]

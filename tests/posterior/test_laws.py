@@ -60,7 +60,7 @@ def test_probabilities_and_differences_are_those_of_the_numbers(compared, single
     densities = {name: leave_one_out(posterior.solution).log_density for name, posterior in single.items()}
     best = max(densities, key=lambda name: densities[name].sum())
     for name in NAMES:
-        difference = densities[name] - densities[best]
+        difference = densities[best] - densities[name]
         assert compared.table.elpd_difference[name] == pytest.approx(difference.sum())
         error = np.sqrt(len(difference) * difference.var())
         assert compared.table.elpd_difference_error[name] == pytest.approx(error)

@@ -32,7 +32,7 @@ def test_a_law_that_is_nearly_certain_is_not_called_one_of_those_that_the_data_d
     table = laws.table_in("MPa")
     said = {}
     for share in (0.6, 0.999):
-        known = table.assign(probability=[share, 1 - share], elpd_difference=[0.0, -0.1], elpd_difference_error=1.0)
+        known = table.assign(probability=[share, 1 - share], elpd_difference=[0.0, 0.1], elpd_difference_error=1.0)
         of_laws = SimpleNamespace(table_in=lambda unit, known=known: known, modulus=laws.modulus, between=laws.between)
         settings = SimpleNamespace(discrepancies=("none",))
         said[share] = law_lead(SimpleNamespace(comparison=of_laws, unit=stress_unit("MPa"), settings=settings))

@@ -22,7 +22,7 @@ def run(tmp_path_factory):
     rows = [f"{a!r},{1000 * b!r}\n" for a, b in zip(data.stretch.tolist(), data.stress.tolist(), strict=True)]
     (folder / "specimen.csv").write_text("stretch,stress_kPa\n" + "".join(rows))
     settings = SpecimenSettings(file="specimen.csv", discrepancies=("none", "gp"), noise_sd=20.0)
-    with run_folder(folder / "run") as place:
+    with run_folder(folder / "run", "fit") as place:
         write_result(specimen_result(run_specimen(settings, folder), [folder / "specimen.csv"]), place, figures=False)
     return folder
 

@@ -91,7 +91,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
 
     study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=found, early=say_answer)
     say("step", "writing the report")
-    with run_folder(RUNS / name, force=True) as folder:
+    with run_folder(RUNS / name, "fit", force=True) as folder:
         write_result(specimen_result(study, _sources(settings)), folder)
     say("done", {"run": name, "report": f"runs/{name}/report.html"})
 
@@ -112,7 +112,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     study = run_laws(settings, Path(), lambda text: say("step", text), found=found)
     folder_name = f"{name}-laws"
     say("step", "writing the report")
-    with run_folder(RUNS / folder_name, force=True) as folder:
+    with run_folder(RUNS / folder_name, "fit", force=True) as folder:
         write_result(law_result(study, _sources(settings)), folder)
     shell = _shell("fit", *_files(request), options | {"out": f"runs/{folder_name}"})
     say(
@@ -145,7 +145,7 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
     prediction = run_prediction(settings, Path(), lambda text: say("step", text))
     target = RUNS / f"{run.name}-{prediction.mode.name}"
     say("step", "writing the report")
-    with run_folder(target, force=True) as folder:
+    with run_folder(target, "predict", force=True) as folder:
         write_result(prediction_result(prediction, settings, target), folder)
     points = settings.points_of(prediction.mode.name)
     python = [*_imports(points), f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'

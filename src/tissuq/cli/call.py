@@ -45,6 +45,8 @@ class Call(Generic[Kind, How]):
         The option of each, as it was typed.
     how : Running
         The other options.
+    command : str
+        The command's name.
     monitor : Monitor
         Is told how the command gets on.
     out : file
@@ -55,6 +57,7 @@ class Call(Generic[Kind, How]):
     stated: dict[str, Any]
     typed: Mapping[str, str]
     how: How
+    command: str
     monitor: Monitor = field(default_factory=Monitor)
     out: TextIO = field(default_factory=lambda: sys.stdout)
 
@@ -122,7 +125,7 @@ class Call(Generic[Kind, How]):
         folder = self.how.out or default
         if apart_from is not None:
             check_apart(folder, apart_from)
-        check_target(folder, force=self.how.force)
+        check_target(folder, self.command, force=self.how.force)
         return folder
 
     def carried_out(
@@ -189,7 +192,7 @@ class Call(Generic[Kind, How]):
         with self.monitor.steps(steps) as step:
             study = run(step)
             step("writing")
-            with run_folder(target, force=self.how.force) as folder:
+            with run_folder(target, self.command, force=self.how.force) as folder:
                 write(study, folder=folder, figures=self.how.figures)
                 self.monitor.write_log(folder, getattr(study, "warnings", ()))
         return study

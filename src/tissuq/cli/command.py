@@ -54,7 +54,7 @@ def command(
             how, typed_how = stated(of_running, values)
             checked = load_settings(running, None, how, typed=typed_how)
             monitor = Monitor(checked.quiet, checked.verbose) if isinstance(checked, Verbosity) else Monitor()
-            call = Call(settings, *stated(of_settings, values), checked, monitor)
+            call = Call(settings, *stated(of_settings, values), checked, carry_out.__name__, monitor)
             with stopping(monitor), redirect_stdout(StringIO()) if monitor.is_quiet else nullcontext():
                 carry_out(call)
 

@@ -46,7 +46,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     if out is not None:
         if any(path.resolve().is_relative_to(out.resolve()) for path in runs):
             raise InputError(f"'{out}' holds one of the compared runs; choose another folder with --out.")
-        check_target(out, force=force)
+        check_target(out, call.command, force=force)
     with call.monitor.steps() as step:
         step("reading")
         trees = _trees(runs)
@@ -56,7 +56,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
     result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
-        with run_folder(out, force=force) as folder:
+        with run_folder(out, call.command, force=force) as folder:
             write_result(result, folder)
     record = result.record()
     print_result(record, out, details=out is None)

@@ -59,7 +59,7 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     target = call.how.out or Path("cards") / f"{run.resolve().name}-{settings.format}"
     check_apart(target, run)
     card_format(settings.format)
-    check_target(target, force=force)
+    check_target(target, call.command, force=force)
     of_cards = settings.model_dump(include={"law", "order", "unit", "bulk_modulus", "poisson", "name", "number"})
     CardSettings(**of_cards)
     posterior = load(run, settings.discrepancy, settings.law_of(call.law))

@@ -48,7 +48,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
 
     write, ask, out, force = call.how.write, call.how.ask, call.how.out, call.how.force
     if out is not None:
-        check_target(out, force=force)
+        check_target(out, call.command, force=force)
     if ask and write is None:
         write = Path("study.toml")
     if write is not None and write.exists() and not force:
@@ -70,6 +70,6 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     if out is not None:
         from tissuq.report.inspection import write_inspection
 
-        with run_folder(out, force=force) as folder:
+        with run_folder(out, call.command, force=force) as folder:
             write_inspection(inspections, folder)
         print(f"\nFigures: {out / 'figures'}" if len(tests) > 1 else f"\nFigure: {out / 'figures' / 'curve.png'}")

@@ -154,8 +154,7 @@ class Tolerances:
 
     def __repr__(self) -> str:
         standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
-        names = [name for name in measurement_errors() if self._sizes.get(name, 0.0) != standard.get(name, 0.0)]
-        sizes = [f"{name}={self._sizes.get(name, 0.0)!r}" for name in names]
+        sizes = [f"{name}={size!r}" for name, size in self.unusual.items()]
         return f"Tolerances({', '.join([repr(self.estimand)] * bool(standard) + sizes)})"
 
     def __eq__(self, value: object) -> bool:
@@ -180,6 +179,13 @@ class Tolerances:
     def stated(self) -> dict[str, float]:
         """The sizes with those of the estimand that are set to zero."""
         return dict(self._stated)
+
+    @property
+    def unusual(self) -> dict[str, float]:
+        """The sizes that are not those of the estimand."""
+        standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
+        sizes = {name: self._sizes.get(name, 0.0) for name in measurement_errors()}
+        return {name: size for name, size in sizes.items() if size != standard.get(name, 0.0)}
 
     @property
     def meaning(self) -> str:
@@ -245,6 +251,17 @@ class Tolerances:
         names = [name for name, size in least_errors.items() if self._sizes.get(name) == size]
         sizes = " and ".join(f"{name} of {self._sizes[name]:.2g}" for name in names)
         return f"the tolerance {sizes} is as large as the measurements show" if names else ""
+
+    def of_another_specimen(self) -> Tolerances:
+        """Return the errors of a test of another specimen, which are of the tissue.
+
+        Its stress differs as specimens do, where that of the same specimen has a smaller error, or none.
+        """
+        if self.estimand != SPECIMEN and self.stress:
+            return self
+        of_tissue = ESTIMANDS[TISSUE].sizes
+        names = (ScaleError.name, TestError.name) if self.estimand == SPECIMEN else (ScaleError.name,)
+        return self.with_sizes(**{name: max(self._sizes.get(name, 0.0), of_tissue[name]) for name in names})
 
     def with_factor(self, factor: float, names: Collection[str]) -> Tolerances:
         """Return the same tolerances with some of their sizes times a factor."""

@@ -17,7 +17,7 @@ from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.model.tolerances import BETWEEN_SPECIMENS, Tolerances, specimens_of
+from tissuq.model.tolerances import Tolerances, specimens_of
 from tissuq.next_test.candidates import Candidate, Stresses, Target, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
 from tissuq.prediction.moments import stress_moments, stress_slopes
@@ -31,8 +31,9 @@ Specimen = Literal["same", "other"]
 """Specimen of the next test: the one of the data, or another one."""
 BATCHES, COMPONENTS_PER_BATCH, LOG2_OUTCOMES = 8, 400, 7
 """Number of independent batches, whose spread gives the error; components of each; base-2 logarithm of its outcomes."""
-MIN_EFFECTIVE_COMPONENTS = 10.0
-"""Smallest effective number of components after the test for which the expectation is reliable."""
+MIN_EFFECTIVE_COMPONENTS, MIN_EFFECTIVE_SHARE = 10.0, 0.3
+"""Smallest effective number of components after the test for which the expectation is reliable; where few are summed
+over (values of the noise), as a share of those before."""
 MAX_REACH = 2.0
 """Largest I1 - 3 and I2 - 3 over those of the data for which an energy discrepancy has a known size."""
 MAX_POINTS = 400
@@ -63,8 +64,8 @@ class NextTest:
 
     Tests of the same specimen have the errors of single measurements that the model has: in the mode of the data they
     are further measurements of the same test (`Posterior.update`), in another mode a test without separate errors. A
-    test of another specimen has separate errors of area, length and zero, by the `Tolerances` of the model, or the
-    usual ones between specimens.
+    test of another specimen has separate errors of area, length and zero, by the `Tolerances` of the model, and differs
+    as specimens of a tissue do (`Tolerances.of_another_specimen`): what is wanted is then the tissue's.
 
     Parameters
     ----------
@@ -114,7 +115,10 @@ class NextTest:
             effective.append(variances.effective)
         ratio, count = np.mean(ratios, axis=0), len(ratios)
         spread = np.std(np.sqrt(ratios), axis=0, ddof=1) / np.sqrt(count) if count > 1 else np.zeros(len(ratio))
-        is_rough = count > 1 and float(np.mean(effective)) < MIN_EFFECTIVE_COMPONENTS
+        weights = self._batches[0].weights
+        now = float(weights.sum() ** 2 / (weights @ weights))
+        least = min(MIN_EFFECTIVE_COMPONENTS, MIN_EFFECTIVE_SHARE * now)
+        is_rough = count > 1 and float(np.mean(effective)) < least
         return Expected(self.sd_now, self.sd_now * np.sqrt(ratio), spread, is_rough)
 
     @cached_property
@@ -129,7 +133,9 @@ class NextTest:
     @property
     def tolerances(self) -> Tolerances:
         """The errors of a test of another specimen."""
-        return self.model.tolerances if self.model.tolerances.stress else BETWEEN_SPECIMENS
+        tolerances = self.model.tolerances
+        has_several = specimens_of(self.model.experiment).shape[1] > 1  # these tell by how much specimens differ
+        return tolerances if has_several and tolerances.stress else tolerances.of_another_specimen()
 
     @property
     def errors_now(self) -> float:

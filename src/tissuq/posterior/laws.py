@@ -160,7 +160,7 @@ class LawComparison:
         table.insert(3, "probability", [self.probabilities[name] for name in self.laws])
         densities = [law.left_out for law in self.laws.values()]
         best = max(densities, key=np.sum)
-        differences = [density - best for density in densities]
+        differences = [best - density for density in densities]
         table.insert(4, "elpd", [float(density.sum()) for density in densities])
         table.insert(5, "elpd_difference", [float(difference.sum()) for difference in differences])
         errors = [float(np.sqrt(len(difference)) * difference.std()) for difference in differences]

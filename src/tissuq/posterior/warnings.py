@@ -49,6 +49,8 @@ MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS = 0.3, 4.0
 
 MAX_SDS_APART = 2.5
 """Standard deviations of the assumed spread of two tests that the log of the ratio of their stresses may be off."""
+MAX_FACTOR_OF_TESTS = 2.0
+"""Of the usual spread between tests of a specimen, that which they tell may be so many times as large."""
 MAX_PROBABILITY_OF_MISSES = 1e-3
 """Probability that so few measurements are inside their 95 % bands, were these right, below which they are not."""
 
@@ -101,10 +103,14 @@ def warnings_about(
     error = solution.log_evidence_error
     if error is not None and not error <= MAX_LOG_EVIDENCE_ERROR and solution.diagnostics is None:
         size = f"about {error:.1g}" if isfinite(error) else "unknown"
+        remedy = (
+            "Give priors that hold less of what the data exclude, or sample (--method nuts, in Python method='nuts')."
+            if solution.model.noise.parameters
+            else "This happens when the given noise is far smaller than the scatter of the data: give a larger noise, "
+            "or leave it unknown."
+        )
         yield ResultWarning(
-            f"numerical integration is inaccurate (error of the log evidence: {size}). This happens when the given "
-            "noise is far smaller than the scatter of the data: give a larger noise, or leave it unknown.",
-            "inaccurate-integral",
+            f"numerical integration is inaccurate (error of the log evidence: {size}). {remedy}", "inaccurate-integral"
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     lag1, held = _lag1_correlation(solution), int(inside.sum())
@@ -241,6 +247,8 @@ def _tests_apart(solution: Solution) -> str:
     of_specimens, of_tests = (
         max(tolerances.sizes.get(name, 0.0), standard.get(name, 0.0)) for name in (ScaleError.name, TestError.name)
     )
+    if is_one_specimen and standard:  # of one specimen, a larger spread is told by what the material cannot explain
+        of_tests = min(of_tests, MAX_FACTOR_OF_TESTS * standard[TestError.name])
     spread = np.hypot(of_tests, 0.0 if is_one_specimen else of_specimens)
     if factors[lowest] > 0 and np.log(factors[highest] / factors[lowest]) <= MAX_SDS_APART * np.sqrt(2) * spread:
         return ""
@@ -248,7 +256,8 @@ def _tests_apart(solution: Solution) -> str:
     return (
         f"the tests contradict each other: the stress of '{names[highest]}' is {factors[highest]:.2g} times that of "
         f"one material for all, and that of '{names[lowest]}' {factors[lowest]:.2g} times, farther apart than the "
-        f"spread of {spread:.0%} that is assumed. The interval may hold neither. "
+        f"spread of {spread:.0%} that {'tests of a specimen may have' if is_one_specimen else 'is assumed'}. "
+        "The interval may hold neither. "
         "See whether units, areas, grips, friction, direction or the state of the specimens differed, and fit each by "
         "itself."
     )

@@ -9,6 +9,7 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.inference.enumerators.noise_grid import NoiseGrid, mean_over_noise
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import integrated
 from tissuq.inference.solution import Solution
@@ -148,6 +149,9 @@ MIN_COMPONENTS = 5
 MIN_EFFECTIVE_SHARE, MAX_KHAT = 0.2, 0.7
 """Effective number of components that are left without a measurement, as a share of those with it, below which its
 density is rough; and the Pareto shape from which it is (Vehtari, Gelman & Gabry 2017)."""
+MAX_GAIN_AT_END = 0.2
+"""By how much the share of the lowest or of the highest value of the noise may grow without a measurement whose density
+is not rough."""
 ARRAYS_PER_CONDENSED = 4
 """Arrays over components and condensed measurements that take part in a density."""
 MIN_PRECISION_SHARE = 1e-12
@@ -175,10 +179,10 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
     Gelfand, Dey & Chang (1992), Bayesian Statistics 4, 147-167; Vehtari, Gelman & Gabry (2017), Statistics and
     Computing 27, 1413-1432 (PSIS).
     """
-    components, is_condensed = solution.wide_mixture, solution.model.condensed is not None
-    size = solution.model.experiment.size * (ARRAYS_PER_CONDENSED if is_condensed else max(1, components.root.shape[2]))
-    if len(components.weights) * size > MAX_VALUES_AT_ONCE:
-        components = components.thinned(max(MIN_COMPONENTS, MAX_VALUES_AT_ONCE // size))
+    wide, is_condensed = solution.wide_mixture, solution.model.condensed is not None
+    size = solution.model.experiment.size * (ARRAYS_PER_CONDENSED if is_condensed else max(1, wide.root.shape[2]))
+    is_thinned = len(wide.weights) * size > MAX_VALUES_AT_ONCE
+    components = wide.thinned(max(MIN_COMPONENTS, MAX_VALUES_AT_ONCE // size)) if is_thinned else wide
     density = left_out_log_density(solution.model, components)
     with np.errstate(divide="ignore"):  # a component may have no weight
         log_weights = np.log(components.weights)[:, None] - density
@@ -189,12 +193,35 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
         varies = np.ptp(density, axis=0) > 0  # a material has no stress at rest, whatever its parameters
         smoothed, khat = array_stats.psislw(density[:, varies], axis=0)
         log_weights[:, varies], is_unsure[varies] = smoothed.T, khat > MAX_KHAT
-    log_weights = log_weights - log_weights.max(axis=0)
-    weights = np.exp(log_weights) / np.exp(log_weights).sum(axis=0)
-    effective = (components.weights**2).sum() / (weights**2).sum(axis=0)
-    top = density.max(axis=0)
-    log_density = top + np.log((weights * np.exp(density - top)).sum(axis=0))
-    return LeaveOneOut(log_density, is_unsure | (effective < MIN_EFFECTIVE_SHARE))
+    elif not NoiseGrid.why_not(solution.model):
+        log_weights, is_unsure = _over_noise(solution.model, wide, components, log_weights)
+    log_weights = log_weights - np.logaddexp.reduce(log_weights, axis=0)
+    effective = components.weights.sum() ** 2 / (components.weights**2).sum()
+    left = 1 / np.exp(2 * log_weights).sum(axis=0)
+    log_density = np.logaddexp.reduce(log_weights + density, axis=0)
+    return LeaveOneOut(log_density, is_unsure | (left < MIN_EFFECTIVE_SHARE * effective))
+
+
+def _over_noise(
+    model: StatisticalModel, wide: GaussianMixture, components: GaussianMixture, log_weights: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return log weights (M, n) with those at each value of the noise as its density says, and what is unsure (n,).
+
+    A measurement that is left out moves the noise, and its inverse density changes much from one value to the next.
+    """
+    column = model.nonlinear.index(NOISE_SD.symbol)
+    values, number = np.unique(components.settings[:, column], return_inverse=True)
+    shares = np.array([wide.weights[wide.settings[:, column] == value].sum() for value in values])
+    if len(values) < 2:
+        return log_weights, np.zeros(log_weights.shape[1], dtype=bool)
+    rows = [np.flatnonzero(number == place) for place in range(len(values))]
+    of_values = np.array([np.logaddexp.reduce(log_weights[of_value], axis=0) for of_value in rows])
+    weights = np.array([components.weights[of_value].sum() for of_value in rows])
+    shares /= shares.sum()
+    _, left = mean_over_noise(np.log(values), shares, of_values - np.log(weights)[:, None])
+    with np.errstate(divide="ignore"):
+        log_weights = log_weights + (np.log(left) - of_values)[number]
+    return log_weights, (left - shares[:, None])[[0, -1]].max(axis=0) > MAX_GAIN_AT_END
 
 
 def left_out_log_density(model: StatisticalModel, components: GaussianMixture) -> FloatArray:

@@ -63,7 +63,7 @@ def write_cards(
     >>> print(cards.files["draw-1.inp"].splitlines()[-2])
     *HYPERELASTIC, YEOH
     """
-    with run_folder(Path(folder), force=force) as scratch:
+    with run_folder(Path(folder), "export", force=force) as scratch:
         cards = card_format(format).cards(ensemble, CardSettings(**settings))
         pairs = zip(cards.index, distances_from_median(ensemble).tolist(), strict=True)
         cards = replace(cards, index=tuple({**row, "from_median": distance} for row, distance in pairs))

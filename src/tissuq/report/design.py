@@ -43,11 +43,16 @@ SDS = ("sd_now", "sd_after")
 def _next_step(study: DesignStudy) -> str:
     """Return what to do, with the estimand for which the expected reduction holds, and the modes of both files."""
     model, is_other = study.posterior.model, study.specimen == "other"
-    estimands = (SPECIMEN, TISSUE) if is_other else (AS_TESTED,)
-    estimand = f" --estimand {model.tolerances.estimand}" * (model.tolerances.estimand in estimands)
+    tolerances = model.tolerances
+    estimand = TISSUE if is_other and tolerances.estimand == SPECIMEN else tolerances.estimand
+    errors = f" --estimand {estimand}" * (estimand == (TISSUE if is_other else AS_TESTED))
+    told = {*model.experiment.least_errors, *(("stress", "test") if len(model.experiment.tests) > 1 else ())}
+    stated = {name: size for name, size in tolerances.unusual.items() if name not in told}
+    errors += "".join(f" --tolerance {name}={size:g}" for name, size in stated.items())
     best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
-    modes = f" --mode {model.experiment.mode.name} --mode {best['mode']}" * (len(model.experiment.tests) == 1)
-    return NEXT.format(whose=" on another specimen" * is_other, options=modes + estimand)
+    tests = model.experiment.tests
+    modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
+    return NEXT.format(whose=" on another specimen" * is_other, options=modes + errors)
 
 
 def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
@@ -71,7 +76,8 @@ def heading(study: DesignStudy, target: Target) -> str:
     """Return what a target is, and how uncertain it is now."""
     factor, unit = _unit(study, target)
     sd_now = significant(float(_rows_of(study, target)["sd_now"].iloc[0]) / factor)
-    return f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now"
+    whose = ", of the tissue" * (study.specimen == "other")
+    return f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
 
 
 def design_figure(study: DesignStudy) -> Figure:

@@ -94,7 +94,7 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
         law = str(table.probability.idxmax())
         remark = f"probability {_percent(float(table.probability[law]))}"
         numbers.append(Number("most probable law", law, remark=remark))
-    best = str(table.elpd_difference.idxmax())
+    best = str(table.elpd_difference.idxmin())
     close = _close(study)
     as_good = f"{len(close) - 1} other{'s' * (len(close) > 2)} as good" if len(close) > 1 else "no other as good"
     return (*numbers, Number("best for left-out measurements", best, remark=as_good))
@@ -103,7 +103,7 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
 def _close(study: LawStudy) -> list[str]:
     """Return the laws that predict left-out measurements as well as the best."""
     table = study.comparison.table_in("MPa")
-    is_close = table.elpd_difference > -SIGNIFICANT_ERRORS * table.elpd_difference_error
+    is_close = table.elpd_difference < SIGNIFICANT_ERRORS * table.elpd_difference_error
     return [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]
 
 
@@ -114,7 +114,7 @@ def readable_laws(study: LawStudy) -> list[list[str]]:
 
 def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
     median, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
-    difference = f"{row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
+    difference = f"{0.0 - row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
     return [
         name,
         median,

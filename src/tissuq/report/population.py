@@ -174,7 +174,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
-        next_step="take a new patient into finite elements: tissuq export, structure or ensemble {run}",
+        next_step="take a new patient into finite elements: tissuq export, structure or ensemble {run}"
+        if population.converged
+        else "sample again, with another --seed; see the first warning",
         picture=Picture(
             "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
         ),

@@ -53,20 +53,23 @@ ASSESSMENT = "assessment.json"
 """The file with the assessment of each discrepancy."""
 
 CONTENTS = "contents.txt"
-"""The list of a run's own files; a folder without it is not a run, and files that it does not list are foreign."""
+"""The list of a run's own files, behind a line that names the command; a folder without it is not a run, and files that
+it does not list are foreign."""
+COMMAND_LINE = "# tissuq "
+"""What that line begins with."""
 
 
-def check_target(target: Path, *, force: bool) -> None:
-    """Refuse a run folder that must not be written.
+def check_target(target: Path, command: str, *, force: bool) -> None:
+    """Refuse a folder that must not be written by a command.
 
     Raises
     ------
     InputError
-        When the folder exists and ``force`` is not set, when it contains something other than a run, or when it cannot
-        be created.
+        When the folder exists and ``force`` is not set, when it contains something other than a run, or what another
+        command made, or when it cannot be created.
     """
     try:
-        _check(target, force)
+        _check(target, command, force)
     except OSError as error:
         raise _not_written(target, error) from error
 
@@ -87,15 +90,15 @@ def check_apart(target: Path, run: Path) -> None:
 
 
 @contextmanager
-def run_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
-    """Give a folder to write a run into; it becomes ``target`` when all is written, and vanishes on any error.
+def run_folder(target: Path, command: str, *, force: bool = False) -> Iterator[Path]:
+    """Give a folder for a command's run; it becomes ``target`` when all is written, and vanishes on any error.
 
     Raises
     ------
     InputError
         When the target must not be overwritten, or the disk refuses to be written.
     """
-    check_target(target, force=force)
+    check_target(target, command, force=force)
     target_path = Path(os.path.realpath(target))
     missing = [folder for folder in target_path.parents if not folder.exists()]
     scratch: Path | None = None
@@ -104,8 +107,9 @@ def run_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
         scratch = Path(mkdtemp(prefix=f".{target_path.name}-", dir=target_path.parent))
         scratch.chmod(0o755)
         yield scratch
-        (scratch / CONTENTS).write_text("".join(f"{name}\n" for name in _files(scratch)), encoding="utf-8")
-        _check(target, force)
+        lines = [f"{COMMAND_LINE}{command}", *_files(scratch)]
+        (scratch / CONTENTS).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        _check(target, command, force)
         _put(scratch, target_path)
     except OSError as error:
         raise _not_written(target, error) from error
@@ -117,7 +121,7 @@ def run_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
                 folder.rmdir()
 
 
-def _check(target: Path, force: bool) -> None:
+def _check(target: Path, command: str, force: bool) -> None:
     if not target.exists():
         _check_parent(target)
         return
@@ -134,7 +138,14 @@ def _check(target: Path, force: bool) -> None:
         raise InputError(
             f"run folder '{target}' already exists; choose another folder with --out, or replace it with --force."
         )
-    foreign = set(_files(target)) - {CONTENTS, *listing.read_text(encoding="utf-8", errors="replace").splitlines()}
+    listed = listing.read_text(encoding="utf-8", errors="replace").splitlines()
+    made_by = next((line.removeprefix(COMMAND_LINE) for line in listed[:1] if line.startswith(COMMAND_LINE)), command)
+    if made_by != command:
+        raise InputError(
+            f"folder '{target}' holds what tissuq {made_by} made, which --force of tissuq {command} does not replace: "
+            "choose another folder with --out, or remove that one first."
+        )
+    foreign = set(_files(target)) - {CONTENTS, *listed}
     if foreign:
         raise InputError(
             f"run folder '{target}' also contains files that do not belong to the run "

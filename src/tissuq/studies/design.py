@@ -61,7 +61,8 @@ class DesignStudy:
     def explanations(self) -> list[str]:
         """How to read the table."""
         whose = (
-            f"another specimen, whose stresses differ by about {self.error:.0%} as a whole"
+            f"another specimen, whose stresses differ by about {self.error:.0%} as a whole; standard deviations, now "
+            "and after, are of the mean of the tissue's specimens"
             if self.specimen == "other"
             else "the same specimen, without additional test errors; for another specimen use --next-specimen other"
         )

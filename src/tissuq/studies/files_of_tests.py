@@ -94,8 +94,8 @@ def measured(
     silent = next((test["file"] for test in tests if "mode" not in test), None)
     if silent is not None:
         raise InputError(
-            f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for each "
-            f"file, in their order ({', '.join(loading_modes())})."
+            f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for all "
+            f"files, or once for each in their order ({', '.join(loading_modes())})."
         )
     pairs = zip(tests, found, strict=True)
     as_found = [of_test if of_test.experiment.mode.name == test["mode"] else None for test, of_test in pairs]

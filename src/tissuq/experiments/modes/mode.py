@@ -16,6 +16,19 @@ from tissuq.registry import find, variants
 
 __all__ = ["SHEAR", "STRETCH", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes"]
 
+WORDS_FOR_MODES = {
+    "tension": "uniaxial",
+    "tensile": "uniaxial",
+    "compression": "uniaxial",
+    "unconfined-compression": "uniaxial",
+    "shear": "simple-shear",
+    "torsion": "simple-shear",
+    "pure-shear": "planar",
+    "equi-biaxial": "equibiaxial",
+    "inflation": "thin-tube",
+}
+"""Words of laboratories for loading modes that have another name here."""
+
 
 @dataclass(frozen=True)
 class Control:
@@ -141,5 +154,19 @@ def loading_mode(mode: str | LoadingMode) -> LoadingMode:
     ------
     ModelError
         When no mode has that name.
+
+    Examples
+    --------
+    >>> loading_mode("compression")
+    Traceback (most recent call last):
+    tissuq.errors.ModelError: there is no loading mode named 'compression': compression is 'uniaxial'.
     """
-    return mode if isinstance(mode, LoadingMode) else find(LoadingMode, "loading mode", mode, ModelError)()
+    if isinstance(mode, LoadingMode):
+        return mode
+    try:
+        return find(LoadingMode, "loading mode", mode, ModelError)()
+    except ModelError as error:
+        word = str(mode).strip().lower().replace("_", "-").replace(" ", "-")
+        if word not in WORDS_FOR_MODES:
+            raise
+        raise ModelError(f"there is no loading mode named '{mode}': {word} is '{WORDS_FOR_MODES[word]}'.") from error

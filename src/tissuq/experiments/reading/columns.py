@@ -296,12 +296,18 @@ def _on_axis_by_unit(table: Table, column: int, axis: str, name: str) -> tuple[s
 
 
 def _without_empty(table: Table, names: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return names of columns, but none of those that hold the same number throughout where others are like them."""
-    kinds = (frozenset().union(*map(role_names, roles)) for roles in (DEFORMATIONS, LOADS))
+    """Return names of columns, but none of those that hold the same number throughout where others are like them.
+
+    An axis that is held at its length while the load along it changes (a strip test) keeps its deformation.
+    """
+    deformations, loads = (frozenset().union(*map(role_names, roles)) for roles in (DEFORMATIONS, LOADS))
     filled = list(names)
-    for kind in kinds:
+    is_loaded = {axis for column, (axis, name) in enumerate(names) if name in loads and not table.is_constant(column)}
+    for kind in (deformations, loads):
         columns = [column for column, (_, name) in enumerate(names) if name in kind]
         empty = [column for column in columns if table.is_constant(column)]
+        if kind is deformations:
+            empty = [column for column in empty if not names[column][0] or names[column][0] not in is_loaded]
         if len(empty) < len(columns):
             for column in empty:
                 filled[column] = "", ""

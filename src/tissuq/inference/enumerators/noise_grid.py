@@ -23,7 +23,7 @@ from tissuq.model.noise import NOISE_SD, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["NoiseGrid", "at_level", "at_noise", "with_known_noise"]
+__all__ = ["NoiseGrid", "at_level", "at_noise", "mean_over_noise", "with_known_noise"]
 
 FloatArray = NDArray[np.float64]
 
@@ -56,6 +56,11 @@ MIN_SPLINE = 4
 """Values from which a cubic spline goes through the log density, which is nearly a parabola."""
 TABLE_POINTS = 801
 """Of the marginal of the noise."""
+DENSITY_STEPS, DENSITY_STEP = 60, 0.2
+"""In which the density at the values of the noise is found from their shares, and their length: what lies beyond an end
+changes much with the density there."""
+FACTORS_AT_ONCE, STEPS_BEYOND = 1000, 4
+"""Factors whose means are computed together, which bounds the memory; steps beyond the values to which they reach."""
 
 
 @dataclass(frozen=True)
@@ -256,6 +261,59 @@ def _shares(logs: FloatArray, table: FloatArray, density: FloatArray) -> FloatAr
     """Return the mass that belongs to every value (k,): of the density about it, between it and its neighbours."""
     cells = density * np.gradient(table)
     return np.array([cells @ np.interp(table, logs, unit) for unit in np.eye(len(logs))])
+
+
+def mean_over_noise(logs: FloatArray, shares: FloatArray, log_factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the posterior mean of factors that change much from one value of the noise to the next.
+
+    The shares of the values are those of what changes little between them. So the density is found of which they are
+    the shares, and interpolated together with the factors.
+
+    Parameters
+    ----------
+    logs, shares : (k,) arrays
+        Logarithms of the values, ascending, and the share of the posterior that each stands for.
+    log_factors : (k, n) array
+
+    Returns
+    -------
+    (n,) array, (k, n) array
+        The logarithms of the means, and the shares of the values in these.
+    """
+    log_density = np.log(shares)
+    for _ in range(DENSITY_STEPS):
+        of_values = _masses(logs, log_density[:, None])[:, 0]
+        log_density = log_density + DENSITY_STEP * np.log(shares / of_values * of_values.sum())
+    total = _masses(logs, log_density[:, None]).sum()
+    blocks = np.array_split(log_density[:, None] + log_factors, 1 + log_factors.shape[1] // FACTORS_AT_ONCE, axis=1)
+    masses = np.concatenate([_masses(logs, heights) for heights in blocks], axis=1)
+    largest = (log_density[:, None] + log_factors).max(axis=0) - log_density.max()
+    return np.log(masses.sum(axis=0) / total) + largest, masses / masses.sum(axis=0)
+
+
+def _masses(logs: FloatArray, heights: FloatArray) -> FloatArray:
+    """Return the mass (k, n) that belongs to every value, of densities with these logarithms (k, n) over their largest.
+
+    Beyond the values the logarithm goes on for a few steps, as a parabola through the last three that does not open
+    upwards; then, where the noise is too small to matter, it falls in proportion to the noise, which its prior leaves.
+    """
+    from scipy.interpolate import Akima1DInterpolator, CubicSpline
+
+    heights = heights - heights.max(axis=0)
+    reach = STEPS_BEYOND * (logs[1] - logs[0])
+    tail = logs[0] - reach - np.linspace(TAIL, 0, TABLE_POINTS // 10, endpoint=False)
+    table = np.append(tail, np.linspace(logs[0] - reach, logs[-1] + reach, TABLE_POINTS))
+    interpolator = Akima1DInterpolator if len(logs) < MIN_SPLINE else CubicSpline
+    log_density = interpolator(logs, heights)(np.clip(table, logs[0], logs[-1]))
+    for is_beyond, order in ((table < logs[0], slice(None)), (table > logs[-1], slice(None, None, -1))):
+        x, y = logs[order][:3], heights[order][:3]
+        slopes = np.diff(y, axis=0) / np.diff(x)[:, None]
+        bend = np.minimum((slopes[-1] - slopes[0]) / (x[-1] - x[0]), 0.0)
+        distance = (table[is_beyond] - x[0])[:, None]
+        log_density[is_beyond] = y[0] + distance * (slopes[0] + bend * (distance - (x[1] - x[0])))
+    log_density[: len(tail)] = log_density[len(tail)] + (tail - table[len(tail)])[:, None]
+    cells = np.exp(log_density) * np.gradient(table)[:, None]
+    return np.asarray(np.array([np.interp(table, logs, unit) for unit in np.eye(len(logs))]) @ cells)
 
 
 def _represented(
