@@ -224,3 +224,16 @@ def test_an_axis_that_is_held_at_its_length_is_read(tmp_path):
     data = read_experiment(path, mode="biaxial")
     assert data.stretch.tolist() == [[1, 1], [1.1, 1], [1.2, 1]]
     assert data.curves[1].stress.tolist() == [0, 0.8e-3, 1.7e-3]
+
+
+def test_a_first_axis_without_a_number_is_read_beside_the_second(tmp_path):
+    path = tmp_path / "sheet.csv"
+    head = "mode,stretch,stress_MPa,stretch_2,stress_2_MPa"
+    rows = "biaxial,1,0,1,0\nbiaxial,1.1,2.1,1.05,0.8\nbiaxial,1.2,4.5,1.1,1.7\n"
+    path.write_text(f"{head}\n{rows}", encoding="utf-8")
+    data = read_experiment(path)
+    assert data.stretch.tolist() == [[1, 1], [1.1, 1.05], [1.2, 1.1]]
+    assert [curve.stress.tolist() for curve in data.curves] == [[0, 2.1, 4.5], [0, 0.8, 1.7]]
+    path.write_text(f"{head},stress_3_MPa,stress\n".replace("stretch_2", "x_2") + "1,1,1,1,1,1,1\n", encoding="utf-8")
+    with pytest.raises(InputError, match="stress2=NAME"):
+        read_experiment(path, mode="biaxial")

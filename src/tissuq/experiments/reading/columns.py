@@ -92,6 +92,8 @@ def choose_columns(
     count = len(mode.stresses)
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
+    if len(mode.machine_axes) > 1 and not mapping:
+        mapping = _with_numbered_second(table)
     mappings = mapping_of_each_stress(mode, mapping)
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
     needed = (LOADS,) if len(mode.controls) == 1 else (LOADS, DEFORMATIONS)
@@ -146,6 +148,22 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     raise InputError(
         f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {columns_there_are(table)}"
     )
+
+
+def _with_numbered_second(table: Table) -> dict[str, str | int]:
+    """Return the roles of columns whose first axis has no number, ``stretch`` beside ``stretch_2``; else none."""
+    columns: dict[str, str | int] = {}
+    names = [on_axis(name) for name, _ in _names(table)]
+    for column, (axis, name) in enumerate(names, start=1):
+        role = next((role for role in (*DEFORMATIONS, *LOADS) if name in role_names(role)), "")
+        numbered = role + "2" * (axis == "y")
+        if role and (axis == "x" or numbered in columns):
+            return {}
+        columns |= {numbered: column} if role else {}
+    seconds = {role.removesuffix("2") for role in columns if role.endswith("2")}
+    firsts = {role for role in columns if not role.endswith("2")}
+    is_whole = firsts == seconds and firsts & {*DEFORMATIONS} and firsts & {*LOADS}
+    return columns if is_whole else {}
 
 
 def _axes_of(table: Table) -> list[str]:
