@@ -95,3 +95,13 @@ def test_with_fibres_the_stretches_along_the_axes_are_to_be_measured_too():
     assert is_calibrated(model, biaxial, points).tolist() == [True, False, False, False, False]
     isotropic = replace(model, material=material_named("neo-hookean"))
     assert is_calibrated(isotropic, biaxial, points).tolist() == [True, True, False, True, False]
+
+
+def test_of_a_sheet_with_a_direction_only_stretches_along_its_axes_were_measured():
+    points = [(1 + a * share, 1 + b * share) for a, b in ((0.2, 0.2), (0.2, 0.1)) for share in (0.5, 1)]
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, points, mode="biaxial", noise_sd=0.01, seed=1)
+    model = tq.fit(data, discrepancy="none", noise_sd=0.01).model
+    for mode, is_measured in (("uniaxial", False), ("equibiaxial", True)):
+        stretch = np.array([1.05])
+        assert is_calibrated(model, loading_mode(mode), stretch).tolist() == [True]
+        assert is_calibrated(model, loading_mode(mode), stretch, is_directed=True).tolist() == [is_measured]

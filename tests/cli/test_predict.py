@@ -100,7 +100,7 @@ BAD = [
     (["."], ["is not a complete run of tissuq fit"]),
     (["RUN"], ["has several discrepancies", "constant, gp, none"]),
     (["RUN", "--discrepancy", "cubic"], ["'cubic'", "constant"]),
-    (["RUN", "--discrepancy", "none", "--mode", "torsion"], ["'torsion'", "planar"]),
+    (["RUN", "--discrepancy", "none", "--mode", "torsion"], ["'torsion'", "planar", "For torsion take 'simple-shear'"]),
     (["RUN", "--discrepancy", "none", "--at", "0.7-2"], ["'0.7-2'", "0.7:2.0"]),
     (["RUN", "--discrepancy", "none", "--at", "2:0.7"], ["'2:0.7'", "LOW:HIGH"]),
     (["RUN", "--discrepancy", "none", "--at", "-1:2"], ["stretch -1", "not positive"]),

@@ -17,7 +17,7 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
-from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
+from tissuq.inference.solution import Solution
 from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
@@ -279,7 +279,7 @@ def _simulating(
     model = solution.model
     if not model.discrepancy.is_energy:
         return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' is an error of the stress and no material"
-    if (solution.direction_probability or 0.0) > PROBABLE_DIRECTION:
+    if solution.is_directed:
         return Verdict.NO, "the tissue has a preferred direction, and draws as materials have none"
     if "unmodelled-curve" in codes:
         return Verdict.NO, "the fitted curve departs from the measured one"

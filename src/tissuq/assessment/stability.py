@@ -314,30 +314,33 @@ def _criteria(
     return baker, drucker, rising
 
 
-def calibrated_range(model: StatisticalModel, mode: LoadingMode) -> tuple[float, float]:
-    """Return the stretches of a mode up to which states were measured.
-
-    Those are states in which I1, I2 and, of a material with fibres, the stretches along the axes are in the measured
-    range.
-    """
-    return measured_range(model.experiment, mode, measured_states(model))
+def calibrated_range(model: StatisticalModel, mode: LoadingMode, *, is_directed: bool = False) -> tuple[float, float]:
+    """Return the stretches of a mode up to which states were measured: `measured_states`."""
+    return measured_range(model.experiment, mode, measured_states(model, is_directed=is_directed))
 
 
-def is_calibrated(model: StatisticalModel, mode: LoadingMode, points: FloatArray) -> Flags:
+def is_calibrated(
+    model: StatisticalModel, mode: LoadingMode, points: FloatArray, *, is_directed: bool = False
+) -> Flags:
     """Return at which points of a mode, (g,) or (g, c), the state is among those that were measured.
 
     With one control that is `calibrated_range`.
     """
     if len(mode.controls) == 1:
-        low, high = calibrated_range(model, mode)
+        low, high = calibrated_range(model, mode, is_directed=is_directed)
         margin = 1e-9 * max(abs(low), abs(high))
         return np.asarray((low - margin <= points) & (points <= high + margin))
-    return measured_states(model).contain(mode.paths[0].at(points))
+    return measured_states(model, is_directed=is_directed).contain(mode.paths[0].at(points))
 
 
-def measured_states(model: StatisticalModel) -> MeasuredStates:
-    """Return the states up to which the material of a model was measured."""
-    return MeasuredStates.of(model.experiment.states, is_isotropic=model.material.is_isotropic)
+def measured_states(model: StatisticalModel, *, is_directed: bool = False) -> MeasuredStates:
+    """Return the states up to which the material of a model was measured.
+
+    Those are states in which I1, I2 and, of a material with fibres or one that has a preferred direction, the stretches
+    along the axes are in the measured range.
+    """
+    is_isotropic = model.material.is_isotropic and not is_directed
+    return MeasuredStates.of(model.experiment.states, is_isotropic=is_isotropic)
 
 
 def measured_range(data: Experiment, mode: LoadingMode, states: MeasuredStates | None = None) -> tuple[float, float]:

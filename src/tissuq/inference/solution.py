@@ -210,6 +210,11 @@ class Solution:
         return float(weights[~are_isotropic(self.model, self.mixture)].sum() / weights.sum())
 
     @property
+    def is_directed(self) -> bool:
+        """Whether the material has a preferred direction, more probably than not."""
+        return (self.direction_probability or 0.0) > PROBABLE_DIRECTION
+
+    @property
     def is_approximate(self) -> bool:
         """Whether the result must not be used as it stands, because sampling has not converged."""
         return self.diagnostics is not None and not self.diagnostics.converged

@@ -133,7 +133,7 @@ def predictions(
 
 def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob: float) -> list[Predicted]:
     model = solution.model
-    is_joint, several = speaks_of(model, mode), len(mode.controls) > 1
+    is_joint, several, is_directed = speaks_of(model, mode), len(mode.controls) > 1, solution.is_directed
     predictions = []
     for channel, quantity in enumerate(mode.stresses):
         options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
@@ -143,8 +143,8 @@ def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob
                 abscissa=stress.stretch,
                 stress=stress,
                 measurements=noisy,
-                is_calibrated=is_calibrated(model, mode, points),
-                calibrated=None if several else calibrated_range(model, mode),
+                is_calibrated=is_calibrated(model, mode, points, is_directed=is_directed),
+                calibrated=None if several else calibrated_range(model, mode, is_directed=is_directed),
                 ways=ways_of(mode, points, stress.stretch),
                 measured=_measured(solution, mode, channel),
                 label="stretch" if several else mode.controls[0].name,

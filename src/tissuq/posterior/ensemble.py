@@ -21,7 +21,7 @@ from tissuq.experiments.headed_tables import headed
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.solution import PROBABLE_DIRECTION, Solution, are_isotropic
+from tissuq.inference.solution import Solution, are_isotropic
 from tissuq.mechanics import Material, StretchMaterial, stress_basis
 from tissuq.mechanics.continuation import Continuation, continuations, rays_to_ends, sum_of_energies
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
@@ -380,14 +380,13 @@ def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> Non
 
 def _isotropic(solution: Solution) -> Solution:
     """Return the posterior given that there is no preferred direction."""
-    probability = solution.direction_probability
-    if not probability:
+    if not solution.direction_probability:
         return solution
-    if probability > PROBABLE_DIRECTION:
+    if solution.is_directed:
         raise ModelError(
-            f"the material has a preferred direction with a probability of {probability:.3g}, and draws as materials "
-            "are the same in all directions: fit with the discrepancy 'auto-isotropic' if its direction does not "
-            "matter."
+            f"the material has a preferred direction with a probability of {solution.direction_probability:.3g}, and "
+            "draws as materials are the same in all directions: fit with the discrepancy 'auto-isotropic' if its "
+            "direction does not matter."
         )
     isotropic = solution.mixture[np.flatnonzero(are_isotropic(solution.model, solution.mixture))]
     mixture = isotropic.weighted(isotropic.weights / isotropic.weights.sum())

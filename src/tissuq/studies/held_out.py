@@ -79,7 +79,7 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
         scores of `tissuq.prediction.scores.Judged.summary`. Measurements without stress are left out, and the band is
         that of a new test with an error of its own.
     """
-    measured, rows = measured_states(posterior.model), []
+    measured, rows = measured_states(posterior.model, is_directed=posterior.solution.is_directed), []
     for curve in test.curves:
         judged_all = judged(posterior.solution, curve, prob=prob)
         calibrated = measured.contain(curve.path.at(judged_all.points))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment.stability import is_calibrated, measured_range, measured_states
+from tissuq.assessment.stability import measured_range, measured_states
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.experiment import Experiment
@@ -21,7 +21,7 @@ from tissuq.model.tolerances import AS_TESTED, SPECIMEN
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
-from tissuq.studies.prediction import Prediction, range_of
+from tissuq.studies.prediction import Prediction, calibrated_points, range_of
 from tissuq.studies.prediction_settings import POINTS, PredictionSettings
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def _extrapolated(
     posterior: Posterior, mode: LoadingMode, grid: FloatArray, channel: int, band: Band, **options: Any
 ) -> FloatArray:
     """Return the share (g,) of the variance of a stress due to how the energy goes on beyond the measured range."""
-    is_beyond, shares = ~is_calibrated(posterior.model, mode, grid), np.zeros(len(grid))
+    is_beyond, shares = ~calibrated_points(posterior, mode, grid), np.zeros(len(grid))
     if is_beyond.any():
         without = _bands(posterior, mode, grid[is_beyond], channel, True, errs_beyond=False, **options)[False]
         beyond = Band(*(column[is_beyond] for column in vars(band).values()))
@@ -227,9 +227,9 @@ def _prediction_warnings(
             "the run was fitted to these measurements: their prediction checks the fit and says nothing about "
             "other data."
         )
-    outside_counts = [(int((~is_calibrated(model, mode, points)).sum()), len(points), "points")]
+    outside_counts = [(int((~calibrated_points(posterior, mode, points)).sum()), len(points), "points")]
     if data is not None:
-        is_inside = is_calibrated(model, mode, data.stretch)
+        is_inside = calibrated_points(posterior, mode, data.stretch)
         outside_counts.append((int((~is_inside).sum()), len(data), "measurements"))
     outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
@@ -249,8 +249,10 @@ def _calibrated_in_words(posterior: Posterior, mode: LoadingMode) -> str:
     """Return up to which states was measured."""
     if ends := range_of(posterior, mode):
         low, high = ends
+        if low == high:
+            return f"in mode {mode.name} a stretch along an axis of the test was not measured, and it has a direction"
         return f"in mode {mode.name} the run is calibrated from {low:.4g} to {high:.4g} ({mode.controls[0].name})"
-    states = measured_states(posterior.model)
+    states = measured_states(posterior.model, is_directed=posterior.solution.is_directed)
     stretches = [f"of {(1 + low) ** 0.5:.4g} to {(1 + high) ** 0.5:.4g}" for low, high in states.strains]
     along_axes = "".join(f", stretch {ends} along axis {axis}" for axis, ends in enumerate(stretches, 1))
     return f"the run is calibrated up to I1 - 3 = {states.I1:.3g} and I2 - 3 = {states.I2:.3g}{along_axes}"

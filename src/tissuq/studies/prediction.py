@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Prediction", "draw_prediction", "range_of"]
+__all__ = ["Prediction", "calibrated_points", "draw_prediction", "range_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -107,13 +107,13 @@ class Prediction:
     @cached_property
     def is_calibrated(self) -> NDArray[np.bool_]:
         """At which points (g,) the state is among those that were measured."""
-        return is_calibrated(self.posterior.model, self.mode, self.points)
+        return calibrated_points(self.posterior, self.mode, self.points)
 
     @property
     def is_data_calibrated(self) -> NDArray[np.bool_]:
         """Of which measurements (n,) that is true."""
         assert self.data is not None  # noqa: S101 (requested only if there are measurements)
-        return is_calibrated(self.posterior.model, self.mode, self.data.stretch)
+        return calibrated_points(self.posterior, self.mode, self.data.stretch)
 
     @property
     def calibrated_range(self) -> tuple[float, float] | None:
@@ -249,7 +249,14 @@ class Prediction:
 
 def range_of(posterior: Posterior, mode: LoadingMode) -> tuple[float, float] | None:
     """Return the stretches up to which states were measured, where a mode has one control."""
-    return calibrated_range(posterior.model, mode) if len(mode.controls) == 1 else None
+    if len(mode.controls) > 1:
+        return None
+    return calibrated_range(posterior.model, mode, is_directed=posterior.solution.is_directed)
+
+
+def calibrated_points(posterior: Posterior, mode: LoadingMode, points: FloatArray) -> NDArray[np.bool_]:
+    """Return at which points (g,) or (g, c) of a mode the state is among those that were measured."""
+    return is_calibrated(posterior.model, mode, points, is_directed=posterior.solution.is_directed)
 
 
 def draw_prediction(axes: Sequence[Axes], prediction: Prediction) -> None:

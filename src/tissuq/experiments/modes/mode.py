@@ -154,12 +154,6 @@ def loading_mode(mode: str | LoadingMode) -> LoadingMode:
     ------
     ModelError
         When no mode has that name.
-
-    Examples
-    --------
-    >>> loading_mode("compression")
-    Traceback (most recent call last):
-    tissuq.errors.ModelError: there is no loading mode named 'compression': compression is 'uniaxial'.
     """
     if isinstance(mode, LoadingMode):
         return mode
@@ -169,4 +163,4 @@ def loading_mode(mode: str | LoadingMode) -> LoadingMode:
         word = str(mode).strip().lower().replace("_", "-").replace(" ", "-")
         if word not in WORDS_FOR_MODES:
             raise
-        raise ModelError(f"there is no loading mode named '{mode}': {word} is '{WORDS_FOR_MODES[word]}'.") from error
+        raise ModelError(f"{error} For {word} take '{WORDS_FOR_MODES[word]}'.") from error
