@@ -88,8 +88,8 @@ def test_fibres_of_a_deck_have_the_posterior_of_a_grid_and_go_on_to_cards(cli, h
     ("matrix", "name", "stretch", "advice"),
     [
         ("neo-hookean", "Wall", "0.9:1.25", "rename 'Wall' to 'ELASTIC_FIBER_Wall'"),
-        ("yeoh", "ELASTIC_FIBER_WALL", "0.9:1.25", "a neo-Hookean matrix with one kind of fibres"),
-        ("gent", "ELASTIC_FIBER_WALL", "0.7:1.25", "a neo-Hookean matrix with one kind of fibres"),
+        ("yeoh", "ELASTIC_FIBER_WALL", "0.9:1.25", "in a neo-Hookean matrix, with nothing beside"),
+        ("gent", "ELASTIC_FIBER_WALL", "0.7:1.25", "in a neo-Hookean matrix, with nothing beside"),
         ("neo-hookean", "ELASTIC_FIBER_WALL", "0.7:1", "goes beyond 1, not 0.7:1"),
     ],
 )

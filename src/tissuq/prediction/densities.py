@@ -9,7 +9,7 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.enumerators.noise_grid import NoiseGrid, mean_over_noise
+from tissuq.inference.enumerators.noise_grid import NoiseGrid, shares_with_factors
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import integrated
 from tissuq.inference.solution import Solution
@@ -218,7 +218,7 @@ def _over_noise(
     of_values = np.array([np.logaddexp.reduce(log_weights[of_value], axis=0) for of_value in rows])
     weights = np.array([components.weights[of_value].sum() for of_value in rows])
     shares /= shares.sum()
-    _, left = mean_over_noise(np.log(values), shares, of_values - np.log(weights)[:, None])
+    left = shares_with_factors(np.log(values), shares, of_values - np.log(weights)[:, None])
     with np.errstate(divide="ignore"):
         log_weights = log_weights + (np.log(left) - of_values)[number]
     return log_weights, (left - shares[:, None])[[0, -1]].max(axis=0) > MAX_GAIN_AT_END

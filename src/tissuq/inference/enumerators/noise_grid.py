@@ -23,7 +23,7 @@ from tissuq.model.noise import NOISE_SD, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["NoiseGrid", "at_level", "at_noise", "mean_over_noise", "with_known_noise"]
+__all__ = ["NoiseGrid", "at_level", "at_noise", "shares_with_factors", "with_known_noise"]
 
 FloatArray = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ DENSITY_STEPS, DENSITY_STEP = 60, 0.2
 """In which the density at the values of the noise is found from their shares, and their length: what lies beyond an end
 changes much with the density there."""
 FACTORS_AT_ONCE, STEPS_BEYOND = 1000, 4
-"""Factors whose means are computed together, which bounds the memory; steps beyond the values to which they reach."""
+"""Factors taken together, which bounds the memory; steps beyond the values to which they reach."""
 
 
 @dataclass(frozen=True)
@@ -263,32 +263,25 @@ def _shares(logs: FloatArray, table: FloatArray, density: FloatArray) -> FloatAr
     return np.array([cells @ np.interp(table, logs, unit) for unit in np.eye(len(logs))])
 
 
-def mean_over_noise(logs: FloatArray, shares: FloatArray, log_factors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the posterior mean of factors that change much from one value of the noise to the next.
+def shares_with_factors(logs: FloatArray, shares: FloatArray, log_factors: FloatArray) -> FloatArray:
+    """Return the shares (k, n) of values of the noise in the posterior times factors, which change much between them.
 
-    The shares of the values are those of what changes little between them. So the density is found of which they are
-    the shares, and interpolated together with the factors.
+    What changes little has the shares of the posterior. So the density is found of which they are the shares, and
+    interpolated together with the factors.
 
     Parameters
     ----------
     logs, shares : (k,) arrays
         Logarithms of the values, ascending, and the share of the posterior that each stands for.
     log_factors : (k, n) array
-
-    Returns
-    -------
-    (n,) array, (k, n) array
-        The logarithms of the means, and the shares of the values in these.
     """
     log_density = np.log(shares)
     for _ in range(DENSITY_STEPS):
         of_values = _masses(logs, log_density[:, None])[:, 0]
         log_density = log_density + DENSITY_STEP * np.log(shares / of_values * of_values.sum())
-    total = _masses(logs, log_density[:, None]).sum()
     blocks = np.array_split(log_density[:, None] + log_factors, 1 + log_factors.shape[1] // FACTORS_AT_ONCE, axis=1)
     masses = np.concatenate([_masses(logs, heights) for heights in blocks], axis=1)
-    largest = (log_density[:, None] + log_factors).max(axis=0) - log_density.max()
-    return np.log(masses.sum(axis=0) / total) + largest, masses / masses.sum(axis=0)
+    return np.asarray(masses / masses.sum(axis=0))
 
 
 def _masses(logs: FloatArray, heights: FloatArray) -> FloatArray:
