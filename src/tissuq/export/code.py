@@ -175,7 +175,10 @@ class FECode(CardFormat):
         matrix, fibres = matrix_and_fibres(ensemble)
         families = self._families(fibres)
         if not families:
-            self._refuse_fibres(ensemble, settings)
+            if form is not None:
+                name = ensemble[0].parts[0][0].name
+                raise InputError(f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out.")
+            self._refuse_fibres(ensemble, law, fibres)
         draws = DrawStresses(matrix)
         requested = self._requested(settings, families)
         candidates = [self._projected(draws, projection, fibres) for projection in requested]
@@ -209,15 +212,11 @@ class FECode(CardFormat):
         """Return whether draws have a card that are a law, or none, and have fibres, or none."""
         return (law is not None and self.form_of(law.material) is not None) or bool(self._families(fibres))
 
-    def _refuse_fibres(self, ensemble: Ensemble, settings: CardSettings) -> NoReturn:
-        """Refuse draws with fibres that have no card here, or none of the law that is asked for."""
-        name, parts = ensemble[0].parts[0][0].name, list(parts_of(ensemble))
-        law, alone = exact_law(ensemble), sum_of(parts)
-        has_form = alone is not None and self.form_of(alone.material) is not None
-        if has_form and law is not None and settings.law is not None:
-            raise InputError(f"material '{name}' has fibres, and the laws of --law are isotropic: leave it out.")
-        reason = self._why_no_card(name, law, fibres_among(parts))
-        if has_form:
+    def _refuse_fibres(self, ensemble: Ensemble, law: Law | None, fibres: Law | None) -> NoReturn:
+        """Refuse draws with fibres that have no card here."""
+        reason = self._why_no_card(ensemble[0].parts[0][0].name, law, fibres)
+        without_energy = sum_of(list(parts_of(ensemble)))
+        if without_energy is not None and self.form_of(without_energy.material) is not None:
             reason += (
                 " Or fit without the free energy of the discrepancy beside the fibres (--discrepancy none, in Python "
                 "discrepancy='none'), or take FElupe, which has all of it (tissuq.finite_elements.FElupeMaterial)."

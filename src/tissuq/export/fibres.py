@@ -8,9 +8,9 @@ from math import cos, degrees, pi, sin
 
 from tissuq.errors import InputError
 from tissuq.export.cards import Cards
-from tissuq.export.laws import Constants, Form, MixtureForm
+from tissuq.export.laws import Constants, Form, MixtureForm, summands
 from tissuq.mechanics import FibreMaterial, Material
-from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, MaterialSum, Rivlin, StandardFibres
+from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, Rivlin, StandardFibres
 
 __all__ = [
     "CALCULIX_PREFIX",
@@ -65,7 +65,7 @@ class FibreForm(Form):
     share: float = 1.0
 
     def holds(self, material: Material) -> bool:
-        *matrix, fibres = _summands(material)
+        *matrix, fibres = summands(material)
         is_neo_hookean = [isinstance(summand, Rivlin) and summand.terms == ("C10",) for summand in matrix]
         if is_neo_hookean != [True] * self.has_matrix or not isinstance(fibres, FibreMaterial):
             return False
@@ -74,7 +74,7 @@ class FibreForm(Form):
         return isinstance(fibres, kinds) and fibres.families == self.families and is_placed
 
     def constants(self, material: Material, values: Sequence[float]) -> Constants:
-        fibres = _summands(material)[-1]
+        fibres = summands(material)[-1]
         assert isinstance(fibres, FibreMaterial)  # noqa: S101 (what it holds)
         of_fibres = values[int(self.has_matrix) :]
         named = dict(zip((parameter.symbol for parameter in fibres.parameters), of_fibres, strict=True))
@@ -97,10 +97,6 @@ def fibres_of_form(form: Form, constants: Constants) -> tuple[FibreForm, Constan
         return None
     fibres = (summand for summand in form.summands if isinstance(summand, FibreForm))
     return next(((summand, form.of_summand(summand, constants)) for summand in fibres), None)
-
-
-def _summands(material: Material) -> tuple[Material, ...]:
-    return material.summands if isinstance(material, MaterialSum) else (material,)
 
 
 def directions(form: FibreForm, constants: Mapping[str, float]) -> list[tuple[float, float]]:

@@ -40,6 +40,7 @@ __all__ = [
     "matrix_and_fibres",
     "parts_of",
     "sum_of",
+    "summands",
     "summands_of",
 ]
 
@@ -114,18 +115,18 @@ def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[M
 
 def matrix_and_fibres(ensemble: Ensemble) -> tuple[Ensemble, Law | None]:
     """Return draws without their fibres, discrepancy included, and the sum of these, if there are any."""
-    summands = list(parts_of(ensemble))
-    matrix = [summand for summand in summands if summand[0].is_isotropic]
+    parts = list(parts_of(ensemble))
+    matrix = [part for part in parts if part[0].is_isotropic]
     draws = (
         replace(draw, parts=tuple((material, tuple(values[row])) for material, values in matrix))
         for row, draw in enumerate(ensemble)
     )
-    return replace(ensemble, draws=tuple(draws)), fibres_among(summands)
+    return replace(ensemble, draws=tuple(draws)), fibres_among(parts)
 
 
-def fibres_among(summands: list[tuple[Material, FloatArray]]) -> Law | None:
+def fibres_among(parts: list[tuple[Material, FloatArray]]) -> Law | None:
     """Return the sum of the fibres among materials with values (N, k), if there are any."""
-    fibres = [Law(*summand) for summand in summands if not summand[0].is_isotropic]
+    fibres = [Law(*part) for part in parts if not part[0].is_isotropic]
     return reduce(Law.plus, fibres) if fibres else None
 
 
@@ -135,9 +136,14 @@ def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:
         yield from summands_of(material, np.array([draw.parts[index][1] for draw in ensemble]))
 
 
+def summands(material: Material) -> tuple[Material, ...]:
+    """Return the materials that one is the sum of, or itself."""
+    return material.summands if isinstance(material, MaterialSum) else (material,)
+
+
 def summands_of(material: Material, values: FloatArray) -> Iterator[tuple[Material, FloatArray]]:
     """Return the materials that one is the sum of, with their values (N, k)."""
-    materials = material.summands if isinstance(material, MaterialSum) else (material,)
+    materials = summands(material)
     ends = pairwise(accumulate((len(material.parameters) for material in materials), initial=0))
     yield from ((material, values[:, start:end]) for material, (start, end) in zip(materials, ends, strict=True))
 

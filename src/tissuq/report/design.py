@@ -43,14 +43,13 @@ SDS = ("sd_now", "sd_after")
 def _next_step(study: DesignStudy) -> str:
     """Return what to do, with the estimand for which the expected reduction holds, and the modes of both files."""
     model, is_other = study.posterior.model, study.specimen == "other"
-    tolerances = model.tolerances
+    tolerances, tests = model.tolerances, model.experiment.tests
     estimand = TISSUE if is_other and tolerances.estimand == SPECIMEN else tolerances.estimand
     errors = f" --estimand {estimand}" * (estimand == (TISSUE if is_other else AS_TESTED))
-    told = {*model.experiment.least_errors, *(("stress", "test") if len(model.experiment.tests) > 1 else ())}
+    told = {*model.experiment.least_errors, *(("stress", "test") if len(tests) > 1 else ())}
     stated = {name: size for name, size in tolerances.unusual.items() if name not in told}
     errors += "".join(f" --tolerance {name}={size:g}" for name, size in stated.items())
     best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
-    tests = model.experiment.tests
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
     return NEXT.format(whose=" on another specimen" * is_other, options=modes + errors)
 

@@ -92,10 +92,10 @@ def choose_columns(
     count = len(mode.stresses)
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
-    if len(mode.machine_axes) > 1 and not mapping:
+    is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
+    if mode.machine_axes and not (is_of_axes or mapping):
         mapping = _with_numbered_second(table)
     mappings = mapping_of_each_stress(mode, mapping)
-    is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
     needed = (LOADS,) if len(mode.controls) == 1 else (LOADS, DEFORMATIONS)
     if not is_of_axes and not all(roles.keys() & kind for roles in mappings[1:] for kind in needed):
         raise _roles_missing(table, mode)
@@ -159,7 +159,8 @@ def _with_numbered_second(table: Table) -> dict[str, str | int]:
         numbered = role + "2" * (axis == "y")
         if role and (axis == "x" or numbered in columns):
             return {}
-        columns |= {numbered: column} if role else {}
+        if role:
+            columns[numbered] = column
     seconds = {role.removesuffix("2") for role in columns if role.endswith("2")}
     firsts = {role for role in columns if not role.endswith("2")}
     is_whole = firsts == seconds and firsts & {*DEFORMATIONS} and firsts & {*LOADS}
