@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -196,3 +198,14 @@ def test_a_prior_that_outweighs_the_data_is_said_and_the_modulus_reported_with_c
         assert verdicts(posterior)[0] == Verdict.CARE
     wide = tq.fit(data, priors={"C10": tq.Normal(3e-3, 3e-2)})
     assert "prior-dominates" not in {warning.code for warning in wide.warnings}
+
+
+def test_stresses_of_other_modes_that_are_known_differently_in_tension_and_compression_are_told_apart():
+    data = tq.simulate("yeoh", YEOH, np.linspace(1.02, 1.8, 20), noise_sd=0.01, seed=1)
+    posterior = gallery.fit(data, noise_sd=0.01, discrepancy="auto")
+    stable, words = posterior.stable_ranges["equibiaxial"], posterior.answer.uses[2].reason
+    stated = re.search(r"equibiaxial stress ± ([\d.]+) % in tension and ± ([\d.]+) % in compression", words)
+    for percent, ends in zip(stated.groups(), ((1.0, stable.high), (stable.low, 1.0)), strict=True):
+        band = posterior.predict(np.linspace(*ends, 9), mode="equibiaxial", noise=False)
+        width, size = band["high"] - band["low"], np.sqrt((band["median"] ** 2).mean())
+        assert float(percent) == pytest.approx(50 * np.sqrt((width**2).mean()) / size, rel=0.02)

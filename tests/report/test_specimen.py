@@ -1,12 +1,15 @@
 """The result of a fit of one material: its answer, comparison and files."""
 
 import json
+import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.report.methods import methods_section
 from tissuq.report.result import Table
 from tissuq.report.specimen import _of_what, specimen_answer, specimen_result
 from tissuq.report.writer import read_record, write_result
@@ -24,7 +27,7 @@ def test_the_numbers_are_those_of_the_answer_in_the_unit_of_the_file(result, spe
     assert (modulus.name, headline.name) == ("initial shear modulus", "C10")
     assert [modulus.value, modulus.low, modulus.high] == pytest.approx([1e3 * x for x in (marginal.mean, low, high)])
     assert {modulus.unit, headline.unit} == {"kPa"}
-    assert specimen_study.tolerances.meaning in result.finding
+    assert specimen_study.posteriors["auto"].model.tolerances.meaning in result.finding
 
 
 def test_what_is_said_before_anything_is_assessed_is_the_head_of_the_result(result, specimen_study):
@@ -48,9 +51,39 @@ def test_every_title_of_the_terminal_is_a_section_of_the_page(result, tmp_path):
     titles = [section["title"] for section in read_record(tmp_path)["sections"]]
     assert titles == [
         "To what extent the material is wrong", "Predictive checks", "Where it is stable", "Every parameter",
-        "How it was computed", "The data and what intervals include",
+        "How it was computed", "The data and what intervals include", "Text for the methods section of a paper",
     ]  # fmt: skip
     assert all(f"<h2>{title}</h2>" in page for title in titles)
+
+
+def test_the_text_for_a_paper_has_model_data_errors_priors_and_result(result, specimen_study):
+    (text,) = next(section.blocks for section in result.sections if section.title.startswith("Text for the methods"))
+    posterior, modulus = specimen_study.posteriors["auto"], result.numbers[0]
+    assert f"W = C10 (I1 - 3) (Treloar 1943), was fitted by Bayesian inference with tissuq {tq.__version__}" in text
+    assert f"{len(specimen_study.experiment)} measurements" in text
+    assert "a further free energy of the invariants without initial stiffness" in text
+    assert posterior.model.tolerances.meaning in text
+    assert "Errors of whole tests" not in text
+    assert "Priors: C10 uniform(0, " in text
+    assert " kPa, c1 half-cauchy(" in text
+    assert posterior.how in text
+    stated = re.search(r"initial shear modulus ([\d.]+) \(([\d.]+) to ([\d.]+)\) kPa", text)
+    assert [float(x) for x in stated.groups()] == pytest.approx([modulus.value, modulus.low, modulus.high], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("discrepancy", "words"),
+    [
+        ("none", "the sum of the material's stress and noise"),
+        ("linear", "m0 + m1 l + S e ('linear' of tissuq; Zera"),
+        ("auto", "Errors of whole tests were included with these standard deviations: 0.05 of the stress"),
+    ],
+)
+def test_the_text_for_a_paper_says_which_discrepancy_there_was(specimen_study, discrepancy, words):
+    study = replace(
+        specimen_study, posteriors={discrepancy: tq.fit(specimen_study.experiment, discrepancy=discrepancy)}
+    )
+    assert words in methods_section(study).blocks[0]
 
 
 def test_the_parameters_for_people_are_those_for_programs(result, specimen_study):

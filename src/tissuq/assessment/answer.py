@@ -251,13 +251,16 @@ def _other_modes(
         return own_tests.verdict, f"uniaxial, equibiaxial and planar stress were measured: {own_tests.reason}"
     try:
         widths = {
-            name: _relative_half_width(predict_band(solution, _grid(stable_range), noise=False, mode=name))
+            name: [
+                _relative_half_width(predict_band(solution, stretch, noise=False, mode=name))
+                for stretch in _compression_and_tension(stable_range)
+            ]
             for name, stable_range in others.items()
         }
     except TissuqError as error:
         return Verdict.NO, str(error)
-    verdict = _worst(*(_precision(width)[0] for width in widths.values()))
-    of_modes = ", ".join(f"{name} stress {_percent(width)}" for name, width in widths.items())
+    verdict = _worst(*(_precision(width)[0] for of_mode in widths.values() for width in of_mode))
+    of_modes = ", ".join(f"{name} stress {_signed_percents(of_mode)}" for name, of_mode in widths.items())
     origin = "measured" if solution.is_of_data else "stated"
     sentence = f"within the strains that were {origin}: {of_modes}"
     if solution.is_of_data and len(measured) == 1:
@@ -265,8 +268,18 @@ def _other_modes(
     return verdict, sentence
 
 
-def _grid(stable_range: StableRange) -> NDArray[np.float64]:
-    return np.linspace(stable_range.low, stable_range.high, GRID_POINTS)
+def _compression_and_tension(stable_range: StableRange) -> list[NDArray[np.float64]]:
+    """Return stretches over a range, those below 1 apart from those above it where it has both."""
+    low, high = stable_range.low, stable_range.high
+    ends = [(low, 1.0), (1.0, high)] if low < 1 < high else [(low, high)]
+    return [np.linspace(*pair, GRID_POINTS) for pair in ends]
+
+
+def _signed_percents(widths: Sequence[float]) -> str:
+    """Return half widths in words: that of the range, or those of compression and tension where they differ."""
+    if len(texts := list(dict.fromkeys(map(_percent, widths)))) == 1:
+        return texts[0]
+    return f"{texts[1]} in tension and {texts[0]} in compression"
 
 
 def _simulating(

@@ -366,7 +366,8 @@ def scores_of(
         predicted = judged(solution, curve, discrepancy=discrepancy, prob=prob)
         predicted = predicted.times(ratio(predicted.points))
         labels = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity}
-        for name, in_range in _ranges(is_calibrated(solution.model, curve.mode, predicted.points)).items():
+        is_measured = is_calibrated(solution.model, curve.mode, predicted.points, is_directed=solution.is_directed)
+        for name, in_range in _ranges(is_measured).items():
             rows.append(labels | {"range": name, "count": int(in_range.sum())} | predicted.where(in_range).summary())
     return pd.DataFrame(rows)
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["computed_section", "data_section", "subject_of"]
+__all__ = ["computed_section", "data_section", "errors_in_words", "noise_in_words", "subject_of", "tests_in_words"]
 
 PRIORS = (
     "Default priors are uniform and wide: boxes ten times as large as a least-squares fit requires (for the material's "
@@ -27,11 +27,11 @@ PRIORS = (
 
 def subject_of(experiment: Experiment) -> str:
     """Return in a line what was measured: the test, or how many there are."""
-    tests = _lines_of_tests(experiment)
+    tests = tests_in_words(experiment)
     return tests[0] if len(tests) == 1 else f"{len(tests)} tests"
 
 
-def _lines_of_tests(experiment: Experiment) -> list[str]:
+def tests_in_words(experiment: Experiment) -> list[str]:
     """Return every test in a few words."""
     return [_test_line(test) for test in experiment.tests]
 
@@ -46,20 +46,21 @@ def _test_line(test: Experiment) -> str:
 
 def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Section:
     """Return where the data are from, and which errors the intervals of a study include."""
-    tests, tolerances = _lines_of_tests(study.experiment), study.tolerances
+    tests, tolerances = tests_in_words(study.experiment), posterior.model.tolerances
     blocks: list[Block] = [tuple(tests)] if len(tests) > 1 else []
     blocks += [f"{study.experiment.source}.", f"Intervals are of {tolerances.meaning}."]
-    if words := _tolerances_in_words(tolerances, study.unit):
+    if words := errors_in_words(tolerances, study.unit):
         blocks.append(
             f"Errors of whole tests (standard deviations): {words}. An error in stress that all tests share cannot be "
             "determined from the data and is included in the intervals; the bands are those of a new test with its own "
             "error."
         )
-    blocks.append(f"Noise: {_noise_in_words(study, posterior)}.")
+    blocks.append(f"Noise: {noise_in_words(study, posterior)}.")
     return Section("The data and what intervals include", tuple(blocks))
 
 
-def _noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:
+def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:
+    """Return what the random errors of single measurements are taken to be."""
     noise, lag, settings = posterior.model.noise, posterior.model.fitted_errors.lag, study.settings
     if noise.parameters:
         return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "")
@@ -67,7 +68,7 @@ def _noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> st
     return f"sd {', '.join(f'{value:g}' for value in values) or f'{settings.noise_sd:g}'} {study.unit.name}"
 
 
-def _tolerances_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
+def errors_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
     """Return the standard deviations of the errors of whole tests in words; empty if there are none."""
     texts = []
     for error, size in tolerances:

@@ -16,6 +16,7 @@ from tissuq.report.figures import answer_figure, described_curves, marginal_figu
 from tissuq.report.held_out import held_out_files, held_out_table
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, subject_of
+from tissuq.report.methods import methods_section
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import ASSESSMENT
 from tissuq.report.stability import stability_cells, stability_rows, stability_section
@@ -176,7 +177,7 @@ def _sections(study: SpecimenStudy, summary: list[Row], predictive: Any) -> tupl
     sections.append(Section("Every parameter", tuple(of_parameters)))
     evidence = EVIDENCE.format(name=study.headline)
     sections.append(computed_section(study.posteriors, study.skipped, evidence, seconds=study.seconds))
-    return (*sections, data_section(study, study.posteriors[study.main]))
+    return (*sections, data_section(study, study.posteriors[study.main]), methods_section(study))
 
 
 def _extent(assessments: Mapping[str, Assessment]) -> Section:

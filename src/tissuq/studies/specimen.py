@@ -27,7 +27,6 @@ from tissuq.model.discrepancy import (
     discrepancies,
     discrepancy_named,
 )
-from tissuq.model.tolerances import Tolerances
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit
@@ -92,11 +91,6 @@ class SpecimenStudy:
     def answer(self) -> Answer:
         """The answer of the main posterior, with what is implausible in the measurements taken into account."""
         return self.posteriors[self.main].answer_with(self.data_warnings)
-
-    @property
-    def tolerances(self) -> Tolerances:
-        """The errors of the tests that the intervals include."""
-        return next(iter(self.posteriors.values())).model.tolerances
 
     @property
     def headline(self) -> str:
