@@ -21,7 +21,8 @@ EVERY_OPTION = {
     "mean_of": 3, "dimensions": {"length": "20 mm", "area": "10 mm2"}, "only": {"Specimen": "S 1"},
     "compression_positive": True, "turn": "load", "load_zero": "0.02 N", "cycle": "last", "branch": "loading",
     "compliance": "0.5 um/N", "leave_out": "31,45:50", "preload": "auto", "stretch_range": [1.0, 1.25],
-    "until_peak": True, "incompressible": True, "every": 2, "axis": "x", "sheet": "2", "table": 1, "skip_rows": 3,
+    "until_peak": True, "relaxed": True, "incompressible": True, "every": 2, "axis": "x", "sheet": "2", "table": 1,
+    "skip_rows": 3,
 }  # fmt: skip
 
 

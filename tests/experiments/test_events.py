@@ -1,3 +1,4 @@
+import itertools
 import re
 
 import numpy as np
@@ -6,7 +7,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.experiments import datasets
-from tissuq.experiments.reading.events import find_holds, find_rupture
+from tissuq.experiments.reading.events import ends_of_rests, find_holds, find_rupture
 
 LAWS = {
     "neo-hookean": lambda share: 1.4 * share - (1.4 * share) ** 2 / 3,
@@ -172,6 +173,54 @@ def test_holds_before_the_largest_stress_are_said_with_their_lines(inspected):
     inspection = inspected(stretch, stress, leave_out=re.search(r"--leave-out (\S+)\.$", note)[1])
     assert inspection.warnings == ()
     assert len(inspection.reading.experiment) == 33
+
+
+def in_steps(count, ramp, hold, noise=0.0, seed=4):
+    """Stretches of a test in steps, and the last row of every one."""
+    levels = np.linspace(1, 1.5, count + 1)
+    ramps = [[*np.linspace(a, b, ramp + 1)[1:], *[b] * hold] for a, b in itertools.pairwise(levels)]
+    stretch = np.concatenate(ramps)
+    random = np.random.default_rng(seed)
+    return stretch + noise * np.ptp(stretch) * random.standard_normal(len(stretch)), np.cumsum(
+        [ramp + hold] * count
+    ) - 1
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
+@pytest.mark.parametrize(
+    ("count", "ramp", "hold"),
+    [(1, 50, 100), (5, 30, 200), (10, 3, 50), (10, 200, 100), (20, 50, 50), (30, 10, 20), (10, 3000, 9000), (6, 1, 10)],
+)
+def test_every_rest_of_a_test_in_steps_is_found_with_its_last_rows(count, ramp, hold, noise):
+    stretch, ends = in_steps(count, ramp, hold, noise)
+    rests = ends_of_rests(stretch)
+    assert len(rests) == count
+    assert (np.abs(rests - ends) <= max(1, 0.1 * hold)).all()
+
+
+@pytest.mark.parametrize("stretch", [np.linspace(1, 1.5, 1000), np.tile(np.r_[1:1.5:200j, 1.5:1:200j], 3), np.ones(1)])
+def test_nothing_rests_where_a_test_goes_on(stretch):
+    assert not len(ends_of_rests(stretch))
+
+
+def test_the_relaxed_stress_of_a_test_in_steps_is_read_as_the_message_says(inspected):
+    stretch, ends = in_steps(5, 20, 100)
+    since = np.tile(np.r_[np.zeros(20), np.linspace(0, 6, 100)], 5)
+    curve = stretch, neo_hookean(stretch) * (1 + 0.4 * np.exp(-since))
+    (note,) = inspected(*curve).warnings
+    assert "to use the relaxed stress of each step give --relaxed; to leave them out give --leave-out " in note
+    inspection = inspected(*curve, relaxed=True)
+    assert inspection.warnings == ("the measurements begin at stretch 1.1, not near 1.",)
+    experiment = inspection.reading.experiment
+    np.testing.assert_allclose(experiment.stretch, stretch[ends], atol=1e-6)
+    np.testing.assert_allclose(experiment.stress, neo_hookean(stretch[ends]) * (1 + 0.4 * np.exp(-6)), atol=1e-6)
+    assert "only the last row of each of 5 rests" in inspection.steps
+    assert "595 dropped: not the last of a rest" in str(inspection)
+
+
+def test_a_test_without_rest_has_no_relaxed_stress(inspected):
+    with pytest.raises(tq.InputError, match=r"the stretch rests nowhere.*Leave out relaxed=True \(--relaxed\)"):
+        inspected(*up(), relaxed=True)
 
 
 def test_until_peak_goes_with_a_cycle_and_a_preload(inspected):

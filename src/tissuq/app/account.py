@@ -42,6 +42,7 @@ WORDS = {
     "preload": "the specimen is taut at {}", "strain-type": "it is {} strain", "stress-type": "it is {} stress",
     "incompressible": "take its volume as constant all the same",
     "until-peak": "leave out what follows the largest stress", "leave-out": "leave out line {}",
+    "relaxed": "take the end of every rest only",
     "compression-positive": "compression is positive in the file", "axis": "take axis {}",
     "every": "take every {}th row",
     "tension-positive": "tension is positive in the file", "stretch": "take stretches {}",

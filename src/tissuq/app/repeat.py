@@ -11,7 +11,7 @@ __all__ = ["Repeat", "command", "fit_lines", "reading_words"]
 Repeat = dict[str, str]
 """A ``shell`` command and lines of ``python``."""
 SWITCHES = {("compression_positive", True): "--compression-positive", ("until_peak", True): "--until-peak"}
-SWITCHES |= {("incompressible", True): "--incompressible"}
+SWITCHES |= {("incompressible", True): "--incompressible", ("relaxed", True): "--relaxed"}
 SWITCHES |= {("compression_positive", False): "--tension-positive"}
 """Options without a value, by setting and its value."""
 OF_PAIRS = {"columns": "--column", "only": "--only", "tolerances": "--tolerance"}

@@ -101,6 +101,7 @@ class ReadingSettings(Settings):
         parse=range_of("--stretch", "1:1.2"),
     )
     until_peak: bool = reading(False, "Leave out the rows after the largest stress.")
+    relaxed: bool = reading(False, "Use only the last row of every rest: the relaxed stress of a test in steps.")
     incompressible: bool = reading(False, "Take a volume as constant that changes by a column of lateral strains.")
     every: int = reading(1, "Use only every N-th row [1].", ge=1)
     axis: str | None = reading(None, "x or y: the only axis to read from a biaxial machine's file.")

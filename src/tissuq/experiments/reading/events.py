@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tissuq.experiments.reading.load_cell import averaged, scatter_of_neighbours
 from tissuq.experiments.reading.table import Column
 
-__all__ = ["Event", "find_holds", "find_rupture", "find_slips"]
+__all__ = ["Event", "ends_of_rests", "find_holds", "find_rupture", "find_slips"]
 
 RUPTURE_FALL, SUDDEN_FALL = 0.2, 0.5
 """Shares of the largest stress by which it falls at a rupture: while the test goes on, and within a few rows."""
@@ -25,6 +25,9 @@ REST, BEND = 0.01, 0.2
 """Share of the range of stretches within which a test rests, and share of that by which it may turn meanwhile."""
 HOLD_FALL, HOLD_ROWS, HOLD_SHARE = 0.04, 8, 0.04
 """Share of the largest stress that is lost in a hold, and rows and share of all rows that it has at least."""
+STILL, TIMES_PASSING, REST_ROWS = 4e-3, 3.0, 4
+"""Share of the range of stretches by which a row at rest is off its level; times as many rows at a level as where the
+test passes on, and rows at least, that make a rest."""
 RESOLUTION = 1e-3
 """Share of the largest stress to which lines between points are right."""
 SCATTERS = 4.0
@@ -168,3 +171,24 @@ def _fall(course: Column, load: Column, band: float) -> float:
     fall = float(load[:2].mean() - load[-third:].mean())
     scatter = float(np.median(np.abs(np.diff(load[-third:])))) if third > 2 else 0.0
     return fall if fall > max(HOLD_FALL, SCATTERS * scatter) else 0.0
+
+
+def ends_of_rests(stretch: Column) -> NDArray[np.intp]:
+    """Return the last row of every rest: where a test stands still for longer than it takes to pass a level.
+
+    Rows at a level are counted; their median over all levels is that of a test that passes on.
+    """
+    band, levels = STILL * float(np.ptp(stretch)), np.sort(stretch)
+
+    def rows_at(level: Column) -> NDArray[np.intp]:
+        return np.searchsorted(levels, level + band, "right") - np.searchsorted(levels, level - band, "left")
+
+    passing = float(np.median(rows_at(np.linspace(levels[0], levels[-1], int(0.5 / STILL)))))
+    at_rest = np.flatnonzero(rows_at(stretch) > max(REST_ROWS, TIMES_PASSING * passing))
+    is_next = (np.diff(at_rest) == 1) & (np.abs(np.diff(stretch[at_rest])) <= 2 * band)
+    ends = []
+    for rest in np.split(at_rest, np.flatnonzero(~is_next) + 1):
+        if len(rest) >= max(REST_ROWS, TIMES_PASSING * passing / 2):
+            away = np.abs(stretch[rest] - np.median(stretch[rest]))
+            ends.append(rest[away <= max(band / 2, float(np.median(away)))][-1])
+    return np.array(ends, dtype=np.intp)

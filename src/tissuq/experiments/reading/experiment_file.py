@@ -215,6 +215,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         Lowest and highest stretch, or amount of shear, of the rows to use, as counted from the preload.
     until_peak : bool
         Leave out the rows after the largest stress of those that are left: rupture, relaxation, unloading.
+    relaxed : bool
+        Use the last row of every rest only: of a test in steps, after each of which the stress relaxes.
     incompressible : bool
         Take the volume of a uniaxial test as constant, though a column of lateral strains says that it changes.
     every : int
@@ -335,6 +337,8 @@ def read_rows(
         used = used.within(*stretch_range)
     if options.get("until_peak"):
         used = used.until_peak()
+    if options.get("relaxed"):
+        used = used.relaxed()
     check_stretches(used, choices)
     stress_measure = loads[0].measure or stress_measure_of(table, choices)
     if stress_measure.engineering:

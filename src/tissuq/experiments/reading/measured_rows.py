@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.reading.events import ends_of_rests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
 from tissuq.experiments.units import StressUnit
@@ -103,6 +104,22 @@ class MeasuredRows:
         return rows_to_peak.with_step(
             f"only rows up to the largest stress, in {self.table.counted} {self.table.lines[peak]}"
         )
+
+    def relaxed(self) -> MeasuredRows:
+        """Return the last row of every rest: that of a test in steps, after each of which the stress relaxes.
+
+        Raises
+        ------
+        InputError
+            When the test rests nowhere.
+        """
+        ends = ends_of_rests(self.course)
+        if not len(ends):
+            raise InputError(
+                f"{self.table.file}: the stretch rests nowhere, so there is no relaxed stress. Leave out relaxed=True "
+                "(--relaxed)."
+            )
+        return self.kept(ends, "not the last of a rest").with_step(f"only the last row of each of {len(ends)} rests")
 
     def without_lines(self, lines: str, absent: Collection[int] = ()) -> MeasuredRows:
         """Return the rows but those of some lines of the file, such as ``31,45:50``; some may be absent already.

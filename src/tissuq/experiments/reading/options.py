@@ -47,6 +47,7 @@ class ReadingOptions(TypedDict, total=False):
     preload: str | None
     stretch_range: Sequence[float] | None
     until_peak: bool
+    relaxed: bool
     incompressible: bool
     every: int
     axis: str | None

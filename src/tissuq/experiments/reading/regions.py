@@ -29,6 +29,8 @@ FEWEST_COPIED_ROWS = 5
 """Rows after one another that measure, to the last digit, what others after one another did."""
 RESTART = 0.5
 """Share of a cycle's range from which the step to the next one is no unloading: the test begins anew."""
+FEWEST_RELAXED = 3
+"""Holds from which their ends are a test by themselves."""
 UNIFORM_SD = 12**-0.5
 """Standard deviation of an error that is even over a step."""
 
@@ -197,12 +199,13 @@ def _holds(tested: TestedStress) -> Iterator[Region]:
     if holds := tested.holds:
         rows = np.concatenate([np.arange(hold.start, hold.stop) for hold in holds])
         is_before_peak = any(hold.stop <= tested.peak for hold in holds)
+        relaxed = "to use the relaxed stress of each step give --relaxed; " * (len(holds) >= FEWEST_RELAXED)
         yield Region(
             "hold",
             rows,
             f"in {tested.place(rows)} the stretch rests while the stress falls by up to "
             f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; "
-            f"{_leave_out(tested, rows) if is_before_peak else UNTIL_PEAK}",
+            f"{relaxed}{_leave_out(tested, rows) if is_before_peak else UNTIL_PEAK}",
         )
 
 
