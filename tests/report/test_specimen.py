@@ -27,7 +27,7 @@ def test_the_numbers_are_those_of_the_answer_in_the_unit_of_the_file(result, spe
     assert (modulus.name, headline.name) == ("initial shear modulus", "C10")
     assert [modulus.value, modulus.low, modulus.high] == pytest.approx([1e3 * x for x in (marginal.mean, low, high)])
     assert {modulus.unit, headline.unit} == {"kPa"}
-    assert specimen_study.posteriors["auto"].model.tolerances.meaning in result.finding
+    assert specimen_study.posteriors["auto"].model.meaning in result.finding
 
 
 def test_what_is_said_before_anything_is_assessed_is_the_head_of_the_result(result, specimen_study):
@@ -62,7 +62,7 @@ def test_the_text_for_a_paper_has_model_data_errors_priors_and_result(result, sp
     assert f"W = C10 (I1 - 3) (Treloar 1943), was fitted by Bayesian inference with tissuq {tq.__version__}" in text
     assert f"{len(specimen_study.experiment)} measurements" in text
     assert "a further free energy of the invariants without initial stiffness" in text
-    assert posterior.model.tolerances.meaning in text
+    assert posterior.model.meaning in text
     assert "Errors of whole tests" not in text
     assert "Priors: C10 uniform(0, " in text
     assert " kPa, c1 half-cauchy(" in text

@@ -136,7 +136,7 @@ def answer_of(
     headline = model.headline
     estimates = [_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])]
     step = _next_step(solution, uses, warnings)
-    return Answer(tuple(estimates), model.tolerances.meaning, tuple(uses), step, model.experiment.stress_unit)
+    return Answer(tuple(estimates), model.meaning, tuple(uses), step, model.experiment.stress_unit)
 
 
 def _estimate(name: str, marginal: Marginal) -> Estimate:

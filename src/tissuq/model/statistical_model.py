@@ -178,6 +178,11 @@ class StatisticalModel(ErrorModel):
         return _basis(self.material, self.discrepancy, states, bent)
 
     @property
+    def meaning(self) -> str:
+        """What an interval of its posterior is of, in words."""
+        return self.tolerances.meaning(self.experiment)
+
+    @property
     def headline(self) -> str:
         """The parameter that summaries put first: the material's first one."""
         return self.material.parameters[0].symbol

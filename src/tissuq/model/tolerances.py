@@ -44,6 +44,8 @@ CONTRADICTION_SPREAD = 0.3
 """Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
 has one of 0.42, as that of the moduli in shear and in tension or compression of 15 isotropic tissues."""
 AS_TESTED, SPECIMEN, TISSUE = "as-tested", "specimen", "tissue"
+ONE_SPECIMEN, MEAN_OF_SPECIMENS = "this specimen", "the mean of the measured specimens"
+"""Of what measurements are in words: with standard errors they are means of several specimens."""
 LABORATORY: Mapping[str, float] = MappingProxyType(
     {"length": 0.01, "slack": 0.005, "smooth": 0.02, "resolution": 0.002}
 )
@@ -59,9 +61,9 @@ class Estimand(NamedTuple):
 
 ESTIMANDS: Mapping[str, Estimand] = MappingProxyType(
     {
-        AS_TESTED: Estimand("this specimen as tested, errors of the test not included", MappingProxyType({})),
+        AS_TESTED: Estimand(f"{ONE_SPECIMEN} as tested, errors of the test not included", MappingProxyType({})),
         SPECIMEN: Estimand(
-            "this specimen, errors of the test included",
+            f"{ONE_SPECIMEN}, errors of the test included",
             MappingProxyType({"stress": 0.05, "test": 0.05, **LABORATORY}),
         ),
         TISSUE: Estimand(
@@ -187,10 +189,10 @@ class Tolerances:
         sizes = {name: self._sizes.get(name, 0.0) for name in measurement_errors()}
         return {name: size for name, size in sizes.items() if size != standard.get(name, 0.0)}
 
-    @property
-    def meaning(self) -> str:
-        """What an interval with these errors is of, in words."""
-        return ESTIMANDS[self.estimand].description if self.estimand else "the specimens, with the stated errors"
+    def meaning(self, experiment: Experiment) -> str:
+        """Return what an interval of data with these errors is of, in words."""
+        words = ESTIMANDS[self.estimand].description if self.estimand else "the specimens, with the stated errors"
+        return words.replace(ONE_SPECIMEN, MEAN_OF_SPECIMENS) if experiment.standard_error.any() else words
 
     @property
     def stress(self) -> float:

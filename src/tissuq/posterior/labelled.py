@@ -102,7 +102,7 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> d
     stiffness = modulus(solution)
     numbers = float(stiffness.quantile(0.5)), *map(float, stiffness.hdi())
     labels |= {f"modulus_{name}": value for name, value in zip(("median", "hdi_low", "hdi_high"), numbers, strict=True)}
-    labels["intervals_of"] = model.tolerances.meaning
+    labels["intervals_of"] = model.meaning
     labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
     units = {parameter.symbol: ", in MPa" if parameter.unit else "" for parameter in model.parameters}
     labels |= {f"prior_{symbol}": f"{prior}{units[symbol]}" for symbol, prior in model.priors.items()}

@@ -70,7 +70,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         title=f"{study.experiment.name}: which law",
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
-        finding=f"{law_lead(study)} The interval is of {study.tolerances.meaning}.",
+        finding=f"{law_lead(study)} The interval is of {study.meaning}.",
         next_step=f"to continue with one law: tissuq predict, export or design {{run}} --material {rows[0]['law']}",
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",

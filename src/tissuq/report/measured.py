@@ -48,7 +48,7 @@ def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Secti
     """Return where the data are from, and which errors the intervals of a study include."""
     tests, tolerances = tests_in_words(study.experiment), posterior.model.tolerances
     blocks: list[Block] = [tuple(tests)] if len(tests) > 1 else []
-    blocks += [f"{study.experiment.source}.", f"Intervals are of {tolerances.meaning}."]
+    blocks += [f"{study.experiment.source}.", f"Intervals are of {posterior.model.meaning}."]
     if words := errors_in_words(tolerances, study.unit):
         blocks.append(
             f"Errors of whole tests (standard deviations): {words}. An error in stress that all tests share cannot be "

@@ -47,8 +47,7 @@ def methods_section(study: SpecimenStudy) -> Section:
         f"{row['parameter']} {row['prior']}{' ' * bool(row['unit'])}{row['unit']}"
         for row in parameter_rows({study.main: posterior})
     )
-    tolerances = posterior.model.tolerances
-    sizes = errors_in_words(tolerances, unit)
+    sizes = errors_in_words(posterior.model.tolerances, unit)
     numbers = []
     for name, *values in study.answer.estimates:
         mean, low, high = (value / unit.to_mpa for value in values)
@@ -62,7 +61,7 @@ def methods_section(study: SpecimenStudy) -> Section:
         f"Priors: {priors}.",
         f"Computation: {posterior.how}.",
         "" if diagnostics is None else diagnostics.verdict,
-        INTERVALS.format(meaning=tolerances.meaning, numbers=", ".join(numbers)),
+        INTERVALS.format(meaning=posterior.model.meaning, numbers=", ".join(numbers)),
     )
     return Section("Text for the methods section of a paper", (" ".join(filter(None, sentences)),))
 

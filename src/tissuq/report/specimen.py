@@ -219,7 +219,7 @@ def _of_what(study: SpecimenStudy) -> str:
     """Return a sentence about intervals that are not of the same; nothing where all are."""
     names: dict[str, list[str]] = {}
     for name, posterior in study.posteriors.items():
-        names.setdefault(posterior.model.tolerances.meaning, []).append(name)
+        names.setdefault(posterior.model.meaning, []).append(name)
     if len(names) == 1:
         return ""
     of_names = "; ".join(f"those of {', '.join(group)} are of {meaning}" for meaning, group in names.items())

@@ -16,7 +16,6 @@ from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
-from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, merged, most_severe_first
 from tissuq.studies.specimen import priors_in_mpa, warnings_of_files
@@ -53,9 +52,9 @@ class LawStudy:
         return stress_unit(self.experiment.stress_unit)
 
     @property
-    def tolerances(self) -> Tolerances:
-        """The errors of the tests that the intervals include."""
-        return next(iter(self.comparison.fits.values())).model.tolerances
+    def meaning(self) -> str:
+        """What the intervals are of, in words."""
+        return next(iter(self.comparison.fits.values())).model.meaning
 
     @property
     def skipped(self) -> Mapping[str, str]:

@@ -239,7 +239,7 @@ def _prediction_warnings(
         texts.append(f"{outside} lie outside the measured range: {calibrated}.")
     if data is not None and not was_fitted and model.tolerances.estimand in (AS_TESTED, SPECIMEN):
         texts.append(
-            f"the bands of this run are of {model.tolerances.meaning}: they do not cover another specimen. To include "
+            f"the bands of this run are of {model.meaning}: they do not cover another specimen. To include "
             "the spread between specimens and tests, fit with --estimand tissue."
         )
     return texts
