@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.modulus import modulus, modulus_symbols
+from tissuq.assessment.sheet import SheetStresses, sheet_stresses
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
 from tissuq.experiments.curve import Curve
@@ -84,6 +85,8 @@ class Answer:
     next_step : Step
     unit : str
         Unit of stress in which it is printed.
+    sheet : SheetStresses, optional
+        Of a sheet with a preferred direction, of which one modulus says little.
     """
 
     estimates: tuple[Estimate, ...]
@@ -91,6 +94,7 @@ class Answer:
     uses: tuple[Use, ...]
     next_step: Step
     unit: str = "MPa"
+    sheet: SheetStresses | None = None
 
     def __str__(self) -> str:
         """Return the answer as lines, in its unit, with what to do next as typed in Python."""
@@ -100,6 +104,7 @@ class Answer:
             for name, mean, low, high in self.estimates
         ]
         lines += [f"The intervals are of {self.meaning}."]
+        lines += [self.sheet.in_words(stress_unit(self.unit))] if self.sheet else []
         lines += [f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses]
         return "\n".join([*lines, f"Next: {self.next_step.python}"])
 
@@ -136,7 +141,8 @@ def answer_of(
     headline = model.headline
     estimates = [_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])]
     step = _next_step(solution, uses, warnings)
-    return Answer(tuple(estimates), model.meaning, tuple(uses), step, model.experiment.stress_unit)
+    unit, sheet = model.experiment.stress_unit, sheet_stresses(solution)
+    return Answer(tuple(estimates), model.meaning, tuple(uses), step, unit, sheet)
 
 
 def _estimate(name: str, marginal: Marginal) -> Estimate:

@@ -56,6 +56,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
     """Return the answer of a fit alone, which is there before anything is assessed."""
     answer, unit, lag = study.answer, study.unit, study.posteriors[study.main].model.fitted_errors.lag
     correlated = f" The errors of consecutive measurements are correlated (lag-1 correlation {lag:.2f})." if lag else ""
+    along_axes = f" {answer.sheet.in_words(unit)}" if answer.sheet else ""
     return Result(
         command="fit",
         title=f"{study.experiment.name}: {study.settings.material} with the discrepancy '{study.main}'",
@@ -64,7 +65,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
             Number(name, mean / unit.to_mpa, low / unit.to_mpa, high / unit.to_mpa, unit.name)
             for name, mean, low, high in answer.estimates
         ),
-        finding=f"The intervals are of {answer.meaning}.{correlated}",
+        finding=f"The intervals are of {answer.meaning}.{correlated}{along_axes}",
         uses=answer.uses,
         next_step=answer.next_step.shell,
         warnings=tuple(study.warnings),
