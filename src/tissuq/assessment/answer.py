@@ -197,8 +197,8 @@ def _precision(half_width: float) -> tuple[Verdict, str]:
 
 
 def _percent(half_width: float) -> str:
-    if not half_width < 10:
-        return "a factor of ten or worse"
+    if not half_width <= 1:
+        return "no better than ± 100 %"
     return f"± {100 * half_width:.0f} %" if half_width >= 0.1 else f"± {max(100 * half_width, 0.1):.2g} %"
 
 
