@@ -36,7 +36,13 @@ def test_a_copy_through_pickle_keeps_what_it_says():
     assert (copy, copy.code, copy.severity, copy.shell) == (warning, warning.code, warning.severity, warning.shell)
 
 
-def test_problems_come_first_and_the_order_stays_within_a_severity():
+def test_what_may_change_the_result_most_comes_first_within_a_severity():
+    slack, apart = ResultWarning("slack.", "slack"), ResultWarning("apart.", "tests-apart")
+    problem = ResultWarning("unit?", "doubtful-reading", Severity.PROBLEM)
+    assert most_severe_first([slack, apart.as_note(), apart, problem]) == ["unit?", "apart.", "slack.", "apart."]
+
+
+def test_problems_come_first_and_the_order_stays_within_a_code():
     texts = [ResultWarning(name, severity=severity) for name, severity in
              (("a", Severity.NOTE), ("b", Severity.CAUTION), ("c", Severity.PROBLEM))]  # fmt: skip
     assert most_severe_first([*texts, "d"]) == ["c", "b", "d", "a"]
@@ -45,7 +51,10 @@ def test_problems_come_first_and_the_order_stays_within_a_severity():
 def test_of_several_results_a_warning_stands_once_with_their_names():
     first, second = (ResultWarning(f"lag {lag}: {{noise}}.", "correlated-residuals", noise="repeats") for lag in (1, 2))
     other = ResultWarning("few.", "few-measurements")
-    assert merged({"a": [first, other], "b": [], "c": [second]}) == ['a, c: lag 1: noise="repeats".', "a: few."]
+    merged_texts = merged({"a": [first, other], "b": [], "c": [second]})
+    assert merged_texts == ['a, c: lag 1: noise="repeats". (The numbers are those of the first.)', "a: few."]
+    assert merged_texts[0].shell.startswith("a, c: lag 1: --noise repeats. (")
+    assert merged({"a": [other], "b": [other]}, everyone="all tests") == ["all tests: few."]
     cut = [ResultWarning(f"cut by a bound of {symbol}.", "prior-bound") for symbol in ("C01", "C20")]
     assert merged({"a": [cut[0]], "b": [cut[1]]}) == ["a: cut by a bound of C01.", "b: cut by a bound of C20."]
     assert merged({"a": [first, other]}) == [first, other]

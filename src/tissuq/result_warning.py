@@ -23,29 +23,30 @@ class Severity(StrEnum):
 
 WARNING_CODES: Mapping[str, str] = MappingProxyType(
     {
-        "best-fit-target": "The discrepancy aims at the best fit of the material, not at its initial modulus.",
-        "contradicting-tests": "Several tests contradict one material.",
-        "correlated-residuals": "The residuals of consecutive measurements are correlated.",
-        "doubtful-reading": "The file states no unit, or a column was read whose name says something else.",
-        "few-measurements": "There are too few measurements to show how the stress deviates from the material.",
-        "inaccurate-integral": "Numerical integration is inaccurate.",
-        "inseparable-noise": "The data cannot separate noise from discrepancy.",
-        "measurements": "Something in the file or in the course of the test is implausible.",
-        "no-direction-looked-for": "A preferred direction is not looked for, because a test measured one axis alone.",
         "not-converged": "Sampling has not converged.",
-        "not-near-reference": "Nothing is measured near the reference state.",
-        "one-direction": "There is tension or compression only.",
-        "poorly-determined": "The data determine the headline parameter poorly.",
-        "prior-bound": "A bound of a prior, not the data, determines part of the result.",
-        "prior-dominates": "A prior that was given determines the result as much as the data do, or more.",
-        "stability-contradicted": "The data contradict the stability that was required.",
+        "doubtful-reading": "The file states no unit, or a column was read whose name says something else.",
         "stress-at-rest": "There is stress at the reference state, which no elastic material has.",
         "tests-apart": "Several tests differ by more than tests of one tissue are assumed to.",
+        "contradicting-tests": "Several tests contradict one material.",
         "unmodelled-curve": "The fitted curve does not follow the measured one.",
+        "measurements": "Something in the file or in the course of the test is implausible.",
+        "few-measurements": "There are too few measurements to show how the stress deviates from the material.",
         "unstable": "Material and discrepancy are more often unstable than stable over the measured range.",
+        "stability-contradicted": "The data contradict the stability that was required.",
+        "prior-bound": "A bound of a prior, not the data, determines part of the result.",
+        "prior-dominates": "A prior that was given determines the result as much as the data do, or more.",
+        "best-fit-target": "The discrepancy aims at the best fit of the material, not at its initial modulus.",
+        "correlated-residuals": "The residuals of consecutive measurements are correlated.",
+        "inaccurate-integral": "Numerical integration is inaccurate.",
+        "not-near-reference": "Nothing is measured near the reference state.",
+        "slack": "The specimen bears no load at the beginning of the test.",
+        "poorly-determined": "The data determine the headline parameter poorly.",
+        "one-direction": "There is tension or compression only.",
+        "no-direction-looked-for": "A preferred direction is not looked for, because a test measured one axis alone.",
+        "inseparable-noise": "The data cannot separate noise from discrepancy.",
     }
 )
-"""Every code that a warning has, with what it says; ``docs/warnings.md`` explains each."""
+"""Every code that a warning has, with what it says, from what matters most; ``docs/warnings.md`` explains each."""
 
 
 NUMBER = re.compile(r"(?<!\w)[-+]?\d[\d.]*(e[-+]?\d+)?")
@@ -109,6 +110,10 @@ class ResultWarning(str):
         """Return the same warning as a note."""
         return self._written(str(self), self.shell, Severity.NOTE)
 
+    def with_end(self, end: str) -> ResultWarning:
+        """Return the same warning with more words at its end."""
+        return self._written(self + end, self.shell + end, self.severity)
+
     def _written(self, python: str, shell: str, severity: Severity) -> ResultWarning:
         warning = ResultWarning(python, self.code, severity)
         warning.shell = shell
@@ -120,22 +125,37 @@ def in_shell(warning: str) -> str:
     return warning.shell if isinstance(warning, ResultWarning) else warning
 
 
-def merged(warnings: Mapping[str, Iterable[ResultWarning]], *, named: bool = False) -> list[ResultWarning]:
+def merged(
+    warnings: Mapping[str, Iterable[ResultWarning]], *, named: bool = False, everyone: str = ""
+) -> list[ResultWarning]:
     """Return the warnings about several results, one of each text with the names of those that it concerns.
 
-    The numbers in it are those of the first. Of a single result they are as they are, unless it is to be ``named``.
+    Texts that differ in numbers alone are one, with the numbers of the first. Of a single result they stand without its
+    name, unless it is to be ``named``; ``everyone`` stands for the names of all.
+
+    Examples
+    --------
+    >>> slack = {name: [ResultWarning(f"{count} rows are slack.")] for name, count in (("A", 3), ("B", 4))}
+    >>> print(*merged(slack, everyone="all tests"))
+    all tests: 3 rows are slack. (The numbers are those of the first.)
     """
-    if len(warnings) == 1 and not named:
-        return list(next(iter(warnings.values())))
-    concerned: dict[tuple[str, str], dict[str, ResultWarning]] = {}
+    concerned: dict[tuple[str, str], list[tuple[str, ResultWarning]]] = {}
     for name, of_result in warnings.items():
         for warning in of_result:
-            concerned.setdefault((warning.code, NUMBER.sub("", warning)), {}).setdefault(name, warning)
-    return [next(iter(by_name.values())).of(by_name) for by_name in concerned.values()]
+            concerned.setdefault((warning.code, NUMBER.sub("", warning)), []).append((name, warning))
+    texts = []
+    for group in concerned.values():
+        names, (warning, *others) = dict.fromkeys(name for name, _ in group), [of_name for _, of_name in group]
+        if any(other != warning for other in others):
+            warning = warning.with_end(" (The numbers are those of the first.)")
+        if named or len(warnings) > 1:
+            warning = warning.of([everyone] if everyone and len(names) == len(warnings) else names)
+        texts.append(warning)
+    return texts
 
 
 def most_severe_first(warnings: Iterable[str]) -> list[ResultWarning]:
-    """Return warnings in the order of their severity; plain sentences are cautions about the measurements."""
-    order = list(Severity)
+    """Return warnings by severity, then as their codes matter; plain sentences are cautions about the measurements."""
+    severities, codes = list(Severity), list(WARNING_CODES)
     known = [text if isinstance(text, ResultWarning) else ResultWarning(text) for text in warnings]
-    return sorted(known, key=lambda warning: order.index(warning.severity))
+    return sorted(known, key=lambda warning: (severities.index(warning.severity), codes.index(warning.code)))

@@ -9,7 +9,9 @@ import pytest
 
 import gallery
 import tissuq as tq
-from tissuq.assessment.answer import PRECISE, Answer, Estimate, Step, Use, Verdict
+from tissuq.assessment.answer import Answer, Estimate
+from tissuq.assessment.next_step import Step
+from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.r_[np.linspace(0.7, 0.98, 8), np.linspace(1.02, 1.6, 12)]
@@ -118,8 +120,11 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     assert "stress at rest" in offset.uses[0].reason
     assert offset.uses[1].verdict is Verdict.CARE
     assert "--load-zero first" in offset.next_step.shell
-    slack = ResultWarning("the first 25 rows carry no load: give --preload auto.")
-    assert "first warning" in vague.answer_with([slack]).next_step.shell
+    torn = ResultWarning("the stress falls while the test goes on: give --until-peak.")
+    assert "warning about the measurements" in vague.answer_with([torn]).next_step.shell
+    slack = ResultWarning("the first 25 rows carry no load: give --preload auto.", "slack")
+    assert "--preload auto" in vague.answer_with([slack]).next_step.shell
+    assert "design" in vague.answer_with([torn.as_note()]).next_step.shell
     assert "design" in vague.answer.next_step.shell
 
 
@@ -209,3 +214,29 @@ def test_stresses_of_other_modes_that_are_known_differently_in_tension_and_compr
         band = posterior.predict(np.linspace(*ends, 9), mode="equibiaxial", noise=False)
         width, size = band["high"] - band["low"], np.sqrt((band["median"] ** 2).mean())
         assert float(percent) == pytest.approx(50 * np.sqrt((width**2).mean()) / size, rel=0.02)
+
+
+def test_a_law_that_does_not_describe_the_measurements_is_said_to_be_wrong_with_the_share_of_the_discrepancy():
+    data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.6, "C30": 0.0}, STRETCH, noise_sd=0.01, seed=1)
+    posterior = gallery.fit(data, discrepancy="auto", noise_sd=0.01)
+    mean, low, high = posterior.assess().share
+    assert mean > PRECISE
+    assert f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})" in (
+        posterior.answer.law
+    )
+    right = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.01, seed=1)
+    assert gallery.fit(right, discrepancy="auto", noise_sd=0.01).answer.law == ""
+
+
+@pytest.mark.parametrize(("ends", "words"), [((-0.3, 0.3), "± 30 %"), ((-0.34, 0.52), "within −34 % and +52 %")])
+def test_both_ends_of_a_skew_interval_are_said(ends, words):
+    assert _ends_in_words(*ends) == words
+
+
+def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
+    posterior = yeoh(discrepancy="auto")
+    assert posterior.answer.uses[1].verdict is Verdict.YES
+    answer = posterior.answer_with([ResultWarning("the tests are apart.", "tests-apart")])
+    assert answer.uses[1].verdict is Verdict.CARE
+    assert "contradict" in answer.uses[1].reason
+    assert "contradict" in answer.next_step.shell

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import tissuq as tq
 from browser import FIRST_SCREEN, needs_chromium, opened
-from tissuq.assessment.answer import Use, Verdict
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.report.laws import HEADERS
 from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table
 from tissuq.report.specimen import specimen_result

@@ -6,10 +6,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
+import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import stress_unit
-from tissuq.report.laws import law_lead
+from tissuq.report.laws import law_lead, recommended_law
 
 
 def test_the_finding_is_said_whether_or_not_a_law_can_be_fitted_alone():
@@ -39,3 +41,24 @@ def test_a_law_that_is_nearly_certain_is_not_called_one_of_those_that_the_data_d
     assert "equally well: the data do not tell these apart" in said[0.6]
     assert "tell these apart" not in said[0.999]
     assert f"that {table.index[0]} is the most probable (99.9 %)" in said[0.999]
+
+
+@pytest.mark.parametrize(
+    ("stable", "elpd_difference", "name"),
+    [
+        ([0.7, 0.9, 1.0], [0.0, 1.0, 9.0], "probable"),
+        ([0.1, 0.9, 1.0], [0.0, 1.0, 9.0], "second"),
+        ([0.1, 0.2, 1.0], [0.0, 1.0, 9.0], "second"),
+        ([np.nan, 0.2, 1.0], [0.0, 1.0, 9.0], "probable"),
+        ([0.1, 0.9, 1.0], [0.0, 9.0, 9.0], "probable"),
+    ],
+)
+def test_a_law_that_is_rarely_stable_is_not_the_one_to_continue_with_where_another_predicts_as_well(
+    stable, elpd_difference, name
+):
+    """The laws stand in the order of their probabilities; the third predicts worse than the others."""
+    laws = pd.DataFrame(
+        {"stable": stable, "elpd_difference": elpd_difference, "elpd_difference_error": 1.0},
+        ["probable", "second", "third"],
+    )
+    assert recommended_law(SimpleNamespace(comparison=SimpleNamespace(table_in=lambda unit: laws))) == name

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.assessment.answer import Use, Verdict
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.report.prediction import (
     band_headers,
     prediction_figure,
@@ -144,7 +144,8 @@ def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(pos
     found = predicted(posterior, mode="planar", stretch=[1.0, 1.2, 9.0])
     write_result(prediction_result(found, PredictionSettings(run="run"), tmp_path), tmp_path, figures=False)
     page = (tmp_path / "report.html").read_text()
-    assert "At stretch 1.2 in mode planar, the engineering stress is" in page
+    assert "engineering stress at stretch 1.2" in page
+    assert "Extrapolated to stretch 9, the engineering stress is" in page
     assert "How the measurements are predicted" not in page
     assert "<img" not in page
 

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 from pydantic import BaseModel
 
-from tissuq.assessment.answer import Use, Verdict
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.errors import InputError
 from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table, few_and_others
 from tissuq.report.terminal import print_result

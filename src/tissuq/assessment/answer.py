@@ -2,56 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.extent import shares_of_discrepancy
-from tissuq.assessment.modulus import modulus, modulus_symbols
+from tissuq.assessment.extent import has_energy, shares_of_discrepancy
+from tissuq.assessment.modulus import modulus
+from tissuq.assessment.next_step import Step, next_step
 from tissuq.assessment.sheet import SheetStresses, sheet_stresses
 from tissuq.assessment.stability import StableRange
-from tissuq.errors import TissuqError
-from tissuq.experiments.curve import Curve
+from tissuq.assessment.uses import PRECISE, Use, uses_of
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
-from tissuq.model.tolerances import TISSUE
-from tissuq.prediction.bands import Band, predict_band
-from tissuq.result_warning import ResultWarning, Severity
+from tissuq.result_warning import ResultWarning
 
-__all__ = ["Answer", "Estimate", "Step", "Use", "Verdict", "answer_of"]
-
-PRECISE, USEFUL = 0.2, 0.5
-"""Half widths of 95 % intervals, over the median, up to which a number is precise, and of use."""
-MIN_INSIDE = 0.9
-"""Share of the measurements inside their 95 % bands below which these do not describe the test."""
-MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
-"""Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
-NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
-"""Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
-SPREAD = "assumed spread between specimens"
-GRID_POINTS = 9
-"""Stretches at which the width of a band is looked at."""
-
-
-class Verdict(StrEnum):
-    """Whether a result can be used for something, from the best to the worst."""
-
-    YES = "yes"
-    CARE = "with care"
-    NO = "no"
-
-
-class Use(NamedTuple):
-    """For what a result can be used, or not, and why."""
-
-    purpose: str
-    verdict: Verdict
-    reason: str
+__all__ = ["Answer", "Estimate", "answer_of"]
 
 
 class Estimate(NamedTuple):
@@ -61,13 +30,6 @@ class Estimate(NamedTuple):
     mean: float
     low: float
     high: float
-
-
-class Step(NamedTuple):
-    """What to do next, as typed in a shell (``{run}`` stands for the folder of the run) and in Python."""
-
-    shell: str
-    python: str
 
 
 @dataclass(frozen=True)
@@ -85,6 +47,8 @@ class Answer:
     next_step : Step
     unit : str
         Unit of stress in which it is printed.
+    law : str
+        Where the law by itself does not describe the measurements: how much of the stress the discrepancy carries.
     sheet : SheetStresses, optional
         Of a sheet with a preferred direction, of which one modulus says little.
     """
@@ -94,7 +58,13 @@ class Answer:
     uses: tuple[Use, ...]
     next_step: Step
     unit: str = "MPa"
+    law: str = ""
     sheet: SheetStresses | None = None
+
+    @property
+    def meaning_in_words(self) -> str:
+        """What numbers and intervals are, in a sentence."""
+        return f"The numbers are posterior means; the intervals are of {self.meaning}."
 
     def __str__(self) -> str:
         """Return the answer as lines, in its unit, with what to do next as typed in Python."""
@@ -103,7 +73,8 @@ class Answer:
             f"{name} {mean / scale:.3g} {self.unit}, 95 % interval {low / scale:.3g} to {high / scale:.3g}"
             for name, mean, low, high in self.estimates
         ]
-        lines += [f"The intervals are of {self.meaning}."]
+        lines += [self.meaning_in_words]
+        lines += [self.law] if self.law else []
         lines += [self.sheet.in_words(stress_unit(self.unit))] if self.sheet else []
         lines += [f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses]
         return "\n".join([*lines, f"Next: {self.next_step.python}"])
@@ -128,274 +99,35 @@ def answer_of(
         Which measurements are inside their 95 % predictive bands.
     """
     model, stiffness = solution.model, modulus(solution)
-    codes = {warning.code for warning in warnings}
-    uses = [
-        Use("report the modulus", *_reporting(solution, stiffness, codes, warnings)),
-        Use("predict these tests", *_own_tests(solution, inside, codes)),
-    ]
-    other_modes = _other_modes(solution, ranges, codes, uses[-1])
-    uses += [
-        Use("predict other loading modes", *other_modes),
-        Use("simulate with finite elements", *_simulating(solution, ranges, other_modes, codes)),
-    ]
-    headline = model.headline
-    estimates = [_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])]
-    step = _next_step(solution, uses, warnings)
-    unit, sheet = model.experiment.stress_unit, sheet_stresses(solution)
-    return Answer(tuple(estimates), model.meaning, tuple(uses), step, unit, sheet)
+    uses = uses_of(solution, stiffness, ranges, warnings, inside)
+    headline, law = model.headline, _law_in_words(solution)
+    return Answer(
+        (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
+        model.meaning,
+        uses,
+        next_step(solution, uses, warnings, is_law_wrong=bool(law)),
+        model.experiment.stress_unit,
+        law,
+        sheet_stresses(solution),
+    )
+
+
+def _law_in_words(solution: Solution) -> str:
+    """Return in words that the law by itself does not describe the measurements; nothing where it does."""
+    (mean, low, high), _ = shares_of_discrepancy(solution)
+    if not has_energy(solution.model) or mean <= PRECISE:
+        return ""
+    law = solution.model.material.name
+    if high < 1:
+        return (
+            f"By itself {law} does not describe the measurements: the discrepancy carries {mean:.0%} of the stress "
+            f"(95 % interval {low:.0%} to {high:.0%})."
+        )
+    return (
+        f"How much of the stress is {law}'s and how much the discrepancy's is not determined ({low:.0%} to {high:.0%} "
+        "is the discrepancy's, which may oppose the law): do not use the parameters without the discrepancy."
+    )
 
 
 def _estimate(name: str, marginal: Marginal) -> Estimate:
     return Estimate(name, marginal.mean, *map(float, marginal.hdi()))
-
-
-def _reporting(
-    solution: Solution, stiffness: Marginal, codes: Collection[str], warnings: Sequence[ResultWarning]
-) -> tuple[Verdict, str]:
-    """Return whether the modulus can be reported."""
-    symbols = modulus_symbols(solution.model)
-    is_cut = any(w.code == "prior-bound" and any(f"{symbol} (" in w for symbol in symbols) for w in warnings)
-    reasons_against = {
-        "sampling has not converged": "not-converged" in codes,
-        "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
-        "there is stress at rest, so that it may be off by far more than its interval": "stress-at-rest" in codes,
-        "a bound of its prior, not the data, determines it": is_cut,
-        "the tests contradict each other, so that it may be that of none of them": "tests-apart" in codes,
-        "the fitted curve departs from the measured one, and the interval does not include that": (
-            "unmodelled-curve" in codes
-        ),
-        "the discrepancy aims at the best fit, not at the modulus": "best-fit-target" in codes,
-    }
-    for reason, applies in reasons_against.items():
-        if applies:
-            return Verdict.NO, reason
-    carried = abs(shares_of_discrepancy(solution)[1][0])
-    low, high = stiffness.hdi()
-    half_width = (high - low) / 2 / abs(float(stiffness.quantile(0.5)))
-    verdict, width = _precision(half_width)
-    if carried > PRECISE:
-        return Verdict.NO, f"the discrepancy carries {carried:.0%} of the initial stiffness, by which it may be off"
-    if not solution.model.discrepancy.parameters:
-        return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
-    if "contradicting-tests" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
-    if "prior-dominates" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
-    if "not-near-reference" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
-    model = solution.model
-    if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
-        common = SPREAD if model.tolerances.estimand == TISSUE else "assumed error of the stress as a whole"
-        return verdict, f"{width}, nearly all of it the {common}"
-    return verdict, width
-
-
-def _precision(half_width: float) -> tuple[Verdict, str]:
-    """Return a verdict on the half width of an interval over its median, and the width in words."""
-    verdict = Verdict.YES if half_width <= PRECISE else Verdict.CARE if half_width <= USEFUL else Verdict.NO
-    return verdict, f"known to {_percent(half_width)}"
-
-
-def _percent(half_width: float) -> str:
-    if not half_width <= 1:
-        return "no better than ± 100 %"
-    return f"± {100 * half_width:.0f} %" if half_width >= 0.1 else f"± {max(100 * half_width, 0.1):.2g} %"
-
-
-def _worst(*verdicts: Verdict) -> Verdict:
-    return max(verdicts, key=list(Verdict).index)
-
-
-def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[str]) -> tuple[Verdict, str]:
-    """Return whether the measured tests are described, over the range in which they were measured."""
-    if not solution.is_of_data:
-        return Verdict.NO, "no test was measured of what this posterior describes"
-    held, count = int(inside.sum()), len(inside)
-    counts = f"{held} of {count} measurements inside the band"
-    try:
-        widths = [_relative_half_width(_band_of(solution, curve)) for curve in solution.model.experiment.curves]
-    except TissuqError as error:
-        return Verdict.NO, str(error)
-    verdict, width = _precision(max(widths))
-    if held < MIN_INSIDE * count:
-        return Verdict.NO, f"only {counts}"
-    sentence = f"stress {width} on average where it was measured, {counts}"
-    for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
-                         ("stress-at-rest", "there is stress at rest, where the material has none")):  # fmt: skip
-        if code in codes:
-            return _worst(verdict, Verdict.CARE), f"{sentence}, but {reason}"
-    return verdict, sentence
-
-
-def _band_of(solution: Solution, curve: Curve) -> Band:
-    """Return the band of the stress itself at measured points that span a curve."""
-    order = np.argsort(curve.abscissa, kind="stable")
-    rows = order[np.linspace(0, len(order) - 1, min(GRID_POINTS, len(order))).astype(int)]
-    return predict_band(solution, curve.points[rows], noise=False, mode=curve.mode, channel=curve.channel)
-
-
-def _relative_half_width(band: Band) -> float:
-    """Return the root mean square of half the width of a band over that of its median."""
-    size = float(np.sqrt(np.mean(band.median**2)))
-    return float(np.sqrt(np.mean((band.high - band.low) ** 2))) / 2 / size if size else np.inf
-
-
-def _other_modes(
-    solution: Solution, ranges: Mapping[str, StableRange], codes: Collection[str], own_tests: Use
-) -> tuple[Verdict, str]:
-    """Return whether loading modes that were not measured can be predicted, within the measured invariants."""
-    model = solution.model
-    measured = {mode.name for mode in model.experiment.modes}
-    if not model.discrepancy.is_energy and model.discrepancy.parameters:
-        return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' belongs to the stress of the measured test"
-    if "unmodelled-curve" in codes:
-        return Verdict.NO, "the material alone does not follow the measured curve"
-    others = {name: stable_range for name, stable_range in ranges.items() if name not in measured}
-    if not others:
-        if not ranges:
-            return Verdict.CARE, "not looked at for this material"
-        return own_tests.verdict, f"uniaxial, equibiaxial and planar stress were measured: {own_tests.reason}"
-    try:
-        widths = {
-            name: [
-                _relative_half_width(predict_band(solution, stretch, noise=False, mode=name))
-                for stretch in _compression_and_tension(stable_range)
-            ]
-            for name, stable_range in others.items()
-        }
-    except TissuqError as error:
-        return Verdict.NO, str(error)
-    verdict = _worst(*(_precision(width)[0] for of_mode in widths.values() for width in of_mode))
-    of_modes = ", ".join(f"{name} stress {_signed_percents(of_mode)}" for name, of_mode in widths.items())
-    origin = "measured" if solution.is_of_data else "stated"
-    sentence = f"within the strains that were {origin}: {of_modes}"
-    if solution.is_of_data and len(measured) == 1:
-        return _worst(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
-    return verdict, sentence
-
-
-def _compression_and_tension(stable_range: StableRange) -> list[NDArray[np.float64]]:
-    """Return stretches over a range, those below 1 apart from those above it where it has both."""
-    low, high = stable_range.low, stable_range.high
-    ends = [(low, 1.0), (1.0, high)] if low < 1 < high else [(low, high)]
-    return [np.linspace(*pair, GRID_POINTS) for pair in ends]
-
-
-def _signed_percents(widths: Sequence[float]) -> str:
-    """Return half widths in words: that of the range, or those of compression and tension where they differ."""
-    if len(texts := list(dict.fromkeys(map(_percent, widths)))) == 1:
-        return texts[0]
-    return f"{texts[1]} in tension and {texts[0]} in compression"
-
-
-def _simulating(
-    solution: Solution,
-    ranges: Mapping[str, StableRange],
-    other_modes: tuple[Verdict, str],
-    codes: Collection[str],
-) -> tuple[Verdict, str]:
-    """Return whether draws of material and discrepancy serve finite elements."""
-    model = solution.model
-    if not model.discrepancy.is_energy:
-        return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' is an error of the stress and no material"
-    if solution.is_directed:
-        return Verdict.NO, "the tissue has a preferred direction, and draws as materials have none"
-    if "unmodelled-curve" in codes:
-        return Verdict.NO, "the fitted curve departs from the measured one"
-    if not model.material.is_isotropic and model.energy_symbols:
-        if len(set(model.experiment.states.paths)) == 1:
-            return (
-                Verdict.NO,
-                "one stress was measured, and neither fibres nor the free energy beside them follow from it",
-            )
-        return Verdict.CARE, "fibres beside a free energy have cards in FEBio alone, and need axes in the model"
-    if not model.material.is_isotropic:
-        return Verdict.CARE, "fibres have cards where a code has their law, and need axes in the model"
-    if not ranges:
-        return Verdict.CARE, "whether it is stable cannot be computed for this material"
-    worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{worst.probability:.0%} of the draws are stable over the measured range"
-    if worst.probability < MIN_STABLE:
-        share += f", least in {worst.mode} loading"
-    if worst.probability < MIN_OFTEN_STABLE:
-        return Verdict.NO, share
-    if other_modes[0] is Verdict.NO:
-        return Verdict.NO, "the stress in other loading modes is not known well enough"
-    stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
-    if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
-        return Verdict.CARE, f"no better than other loading modes are known; {share}"
-    return _worst(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"
-
-
-STEPS: Mapping[str, Step] = {
-    "auto": Step(
-        "let the data decide how wrong the material is: fit again with --discrepancy auto.",
-        'let the data decide how wrong the material is: fit again with discrepancy="auto".',
-    ),
-    "problem": Step("act on the first warning: it says what to do.", "act on the first warning: it says what to do."),
-    "measurements": Step(
-        "act on the first warning: it concerns the measurements themselves.",
-        "act on the first warning: it concerns the measurements themselves.",
-    ),
-    "zero": Step(
-        "take off what the load cell shows at rest: fit again with --load-zero first, or as the first warning says.",
-        'take off what the load cell shows at rest: fit again with load_zero="first", or as the first warning says.',
-    ),
-    "few": Step(
-        "measure at more stretches, from near rest onward: tissuq design {run} says which.",
-        "measure at more stretches, from near rest onward: posterior.design() says which.",
-    ),
-    "specimens": Step(
-        "measure further specimens: how much they differ is assumed so far, and sets the width.",
-        "measure further specimens: how much they differ is assumed so far, and sets the width.",
-    ),
-    "design": Step(
-        "see which test would make it narrower: tissuq design {run}",
-        "see which test would make it narrower: posterior.design()",
-    ),
-    "apart": Step(*["find out why the tests contradict each other, as the warning says."] * 2),
-    "curve": Step(*["act on the warning about the measured curve, which the fit does not follow."] * 2),
-    "second mode": Step(
-        "measure a second loading mode; tissuq design {run} says which helps most.",
-        "measure a second loading mode; posterior.design() says which helps most.",
-    ),
-    "stable": Step(
-        "restrict the fit to stable materials: fit again with --stable-in all.",
-        'restrict the fit to stable materials: fit again with stable_in="all".',
-    ),
-    "export": Step(
-        "take it into finite elements: tissuq export {run} --format abaqus",
-        "take it into finite elements: posterior.ensemble(20), tq.write_cards",
-    ),
-}
-"""What may be done next."""
-BEFORE_ALL_ELSE = {"tests-apart": "apart", "unmodelled-curve": "curve"}
-"""Warnings without which no further step helps."""
-
-
-def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
-    """Return the one thing to do next."""
-    if any(warning.severity is Severity.PROBLEM for warning in warnings):
-        return STEPS["problem"]
-    reporting, _, others, simulating = (use.verdict for use in uses)
-    codes = {warning.code for warning in warnings}
-    model = solution.model
-    if "stress-at-rest" in codes:
-        return STEPS["zero"]
-    if reporting is not Verdict.YES and "measurements" in codes:
-        return STEPS["measurements"]
-    if not solution.is_of_data:
-        return STEPS["export"]
-    if not model.energy_symbols and model.material.is_isotropic:
-        return STEPS["auto"]
-    if "few-measurements" in codes and reporting is Verdict.NO:
-        return STEPS["few"]
-    if first := next((STEPS[step] for code, step in BEFORE_ALL_ELSE.items() if code in codes), None):
-        return first
-    if "unstable" in codes:
-        return STEPS["stable"]
-    if reporting is not Verdict.YES:
-        return STEPS["specimens" if SPREAD in uses[0].reason else "design"]
-    if others is not Verdict.YES and len(model.experiment.modes) == 1:
-        return STEPS["second mode"]
-    return STEPS["export" if simulating is not Verdict.NO else "design"]

@@ -18,13 +18,13 @@ __all__ = ["intervals"]
 
 
 def intervals(axis: Axes, marginals: Mapping[str, Marginal], average: Marginal, label: str, factor: float) -> None:
-    """Draw medians and 95 % intervals by name, and those of an average in black beneath; ``factor`` is that of a unit.
+    """Draw means and 95 % intervals by name, and those of an average in black beneath; ``factor`` is that of a unit.
 
-    Far ones may leave the axis, which shows every median.
+    Far ones may leave the axis, which shows every mean.
     """
     named = {**marginals, "all, by probability": average}
     levels = rows(axis, list(named))
-    ends = np.array([(low, float(m.quantile(0.5)), high) for m in named.values() for low, high in [m.hdi()]]) / factor
+    ends = np.array([(low, m.mean, high) for m in named.values() for low, high in [m.hdi()]]) / factor
     for number, color in ((slice(-1), BAND), (slice(-1, None), INK)):
         forest(axis, levels[number], *ends[number].T, color=color)
     axis.set_xlabel(label)

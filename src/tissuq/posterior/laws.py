@@ -129,7 +129,7 @@ class LawComparison:
         - discrepancy_share, _low, _high: the part of the stress that the discrepancy carries: mean and 95 % interval.
         - stable, stable_beyond: probability of stability over the range of the invariants that was measured, and up to
           1.5 times these; in the least stable loading mode. Missing where the energy does not tell.
-        - modulus, modulus_low, modulus_high: median and 95 % HDI of the law's initial shear modulus.
+        - modulus, modulus_low, modulus_high: mean and 95 % HDI of the law's initial shear modulus.
         - seconds: how long the fit took.
 
         The unit of the moduli stands at the head of the columns; `table_in` gives another one.
@@ -240,7 +240,7 @@ class LawComparison:
         for name in self._in_order:
             modulus = self._moduli[name]
             low, high = modulus.hdi()
-            rows.append((self.probabilities[name], float(modulus.quantile(0.5)), low, high))
+            rows.append((self.probabilities[name], modulus.mean, low, high))
         columns = ["probability", "modulus", "modulus_low", "modulus_high"]
         table = in_unit(pd.DataFrame(rows, self._in_order, columns), columns[1:], self._unit)
         return str(table.to_html(float_format="{:.4g}".format))
@@ -357,7 +357,7 @@ def _row(posterior: Posterior, modulus: Marginal, alone: LeastSquares | None) ->
         **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),
         "stable": min(stable, default=np.nan),
         "stable_beyond": min((of_mode.probability for of_mode in ranges_beyond), default=np.nan),
-        "modulus": float(modulus.quantile(0.5)),
+        "modulus": modulus.mean,
         **dict(zip(("modulus_low", "modulus_high"), modulus.hdi(), strict=True)),
     }
 

@@ -11,7 +11,7 @@ from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.measurements import labels_of_tests
-from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.inference.solution import Solution
@@ -125,9 +125,10 @@ def warnings_about(
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
     if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
+        simpler = ", or fit a law with fewer parameters" if len(solution.model.material_symbols) > 1 else ""
         yield ResultWarning(
             f"the data determine {headline} poorly: its 95 % interval is wider than its median. Measure more points, "
-            "nearer to stretch 1, or with less noise.",
+            f"nearer to stretch 1, or with less noise{simpler}.",
             "poorly-determined",
         )
     if cut:
@@ -142,7 +143,9 @@ def _instability(solution: Solution, stable_range: StableRange) -> ResultWarning
     """Return the warning for a material that is rarely stable, in the loading mode in which it is least stable."""
     what = "material and discrepancy together are" if has_energy(solution.model) else "the material is"
     how = "rarely stable" if stable_range.probability < MIN_LOSS_PROBABILITY else "unstable more often than stable"
-    at_rest = " (already at rest: the initial shear modulus is negative)" if stable_range.loss.median == 1 else ""
+    at_rest = " (already at rest)" if stable_range.loss.median == 1 else ""
+    if at_rest and modulus(solution).mean < 0:
+        at_rest = " (already at rest: the initial shear modulus is negative)"
     return ResultWarning(
         f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: measure in more "
         "loading modes, choose another material, or restrict the fit to stable materials ({stable_in}).",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tissuq.assessment.uses import MIN_OFTEN_STABLE, MIN_STABLE
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import columns_of, legend_above, on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
@@ -20,7 +21,7 @@ from tissuq.studies.laws import LawStudy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["HEADERS", "law_lead", "law_result", "readable_laws"]
+__all__ = ["HEADERS", "law_lead", "law_result", "readable_laws", "recommended_law"]
 
 MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
@@ -61,9 +62,12 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     }
     discrepancy = settings.discrepancies[0]
     caption = (
-        f"Initial shear modulus under every law with the discrepancy '{discrepancy}': median and 95 % HPD, and the "
+        f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % HPD, and the "
         "average by the laws' probabilities."
     )
+    law = recommended_law(study)
+    answer = comparison.fits[law].answer_with(study.data_warnings)
+    is_stable = " and stable" if comparison.table_in("MPa").stable[law] >= MIN_STABLE else ""
     headers = [HEADERS[0], f"modulus [{unit.name}]", *HEADERS[2:]]
     return Result(
         command=f"fit{inputs.options}",
@@ -71,7 +75,9 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
-        next_step=f"to continue with one law: tissuq predict, export or design {{run}} --material {rows[0]['law']}",
+        uses=tuple(use._replace(purpose=f"{use.purpose}, with {law}") for use in answer.uses),
+        next_step=f"continue with {law}, which is as good as any here{is_stable}: tissuq predict, export or design "
+        f"{{run}} --material {law}",
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",
                       note="Log evidences, intervals of the shares and times are in `laws.csv`."),),
@@ -88,8 +94,8 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
     comparison, scale = study.comparison, study.unit.to_mpa
     table, modulus = comparison.table_in("MPa"), comparison.modulus
     low, high = (end / scale for end in modulus.hdi())
-    median = float(modulus.quantile(0.5)) / scale
-    numbers = [Number("initial shear modulus, averaged over the laws", median, low, high, study.unit.name)]
+    mean = modulus.mean / scale
+    numbers = [Number("initial shear modulus, averaged over the laws", mean, low, high, study.unit.name)]
     if table.probability.notna().any():
         law = str(table.probability.idxmax())
         remark = f"probability {_percent(float(table.probability[law]))}"
@@ -97,7 +103,20 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
     best = str(table.elpd_difference.idxmin())
     close = _close(study)
     as_good = f"{len(close) - 1} other{'s' * (len(close) > 2)} as good" if len(close) > 1 else "no other as good"
-    return (*numbers, Number("best for left-out measurements", best, remark=as_good))
+    stable = float(table.stable[best])
+    but = f"; stable over the measured range with a probability of {_percent(stable)}" if stable < MIN_STABLE else ""
+    return (*numbers, Number("best for left-out measurements", best, remark=as_good + but))
+
+
+def recommended_law(study: LawStudy) -> str:
+    """Return the law to continue with.
+
+    Of those that predict left-out measurements as well as the best it is the most probable one that is more often
+    stable than not over the measured range, or the one that most probably is.
+    """
+    table = study.comparison.table_in("MPa").loc[_close(study)]
+    stable = table[~(table.stable < MIN_OFTEN_STABLE)]
+    return str(table.stable.idxmax() if stable.empty else stable.index[0])
 
 
 def _close(study: LawStudy) -> list[str]:
@@ -113,11 +132,11 @@ def readable_laws(study: LawStudy) -> list[list[str]]:
 
 
 def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
-    median, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
+    mean, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
     difference = f"{0.0 - row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
     return [
         name,
-        median,
+        mean,
         f"[{low}, {high}]",
         f"{row.parameters:.0f}",
         _percent(row.probability),
@@ -146,9 +165,9 @@ def law_lead(study: LawStudy) -> str:
         f" Alone, without discrepancy, {name} comes nearest to the measurements (error {100 * error:.1f} %)."
         for name, error in nearest.items()
     ]
-    median = significant(float(modulus.quantile(0.5)) / unit.to_mpa)
+    mean = significant(modulus.mean / unit.to_mpa)
     return (
-        f"The initial shear modulus, averaged over the laws, is {median} {unit.name}, 95 % HPD {low} to {high} "
+        f"The initial shear modulus, averaged over the laws, has the mean {mean} {unit.name}, 95 % HPD {low} to {high} "
         f"{unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
         f"{told[0].upper()}{told[1:]}." + "".join(alone)
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.answer import Use, Verdict
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
@@ -137,8 +137,8 @@ def _use_of_mode(prediction: Prediction, run: Path) -> tuple[Use, ...]:
 
 
 def _stresses_at_the_end(prediction: Prediction) -> list[Number]:
-    """Return every stress at the point farthest from rest, with its band."""
-    index, scale = int(_changes(prediction).argmax()), prediction.unit.to_mpa
+    """Return every stress at the end of what is calibrated, with its band."""
+    index, scale = _calibrated_end(prediction), prediction.unit.to_mpa
     is_known = prediction.is_calibrated[index]
     numbers = []
     for channel, name in enumerate(prediction.stresses):
@@ -157,8 +157,9 @@ def _shares(prediction: Prediction) -> list[Number]:
         kind = "with" if prediction.kinds[0] else "without"
         rows = prediction.scores[(prediction.scores["discrepancy"] == kind) & (prediction.scores["range"] == "all")]
         inside, all_of_them = round(float((rows["inside"] * rows["count"]).sum())), int(rows["count"].sum())
-        value = f"{inside} of {all_of_them}"
-        numbers.append(Number("measurements inside the band", value, remark=f"{100 * prediction.prob:.4g} % expected"))
+        value, width = f"{inside} of {all_of_them}", f"half width of the band {_share(float(rows['half_width'].max()))}"
+        remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
+        numbers.append(Number("measurements inside the band", value, remark=remark))
     beyond = count - int(prediction.is_calibrated.sum())
     remark = "outside the measured range of I1 and I2" if beyond else "all within the measured range"
     numbers.append(Number("extrapolated", f"{beyond / count:.0%} of the points", remark=remark))
@@ -221,7 +222,7 @@ def _sections(prediction: Prediction) -> tuple[Section, ...]:
     scores = (
         f"**Inside**: the share of measurements in the {share} band of measurements, which should be about {share}; if "
         "it is less, the band is too narrow for these data; if it is 100 %, the band may be too wide.",
-        "**Half width** of that band and **error** of its mean: root mean squares, relative to that of the measured "
+        "**Half width** of that band and **error** of its median: root mean squares, relative to that of the measured "
         "stress.",
         "**CRPS** (continuous ranked probability score) and **interval score** reward bands that are narrow and hold "
         "the data, in the unit of stress; less is better. They compare predictions of the same measurements, here with "
@@ -316,7 +317,11 @@ def _median(band: Band, index: int, scale: float) -> str:
     median, width = (float(stress[index]) / scale for stress in (band.median, band.high - band.low))
     if max(abs(median), width) < MIN_STRESS:
         return "0"
-    return interval(median, median, width / 4)[0] if abs(median) < MAX_STRESS else f"{median:.0e}"
+    return (
+        interval(median, median, min(width / 4, abs(median) or width))[0]
+        if abs(median) < MAX_STRESS
+        else f"{median:.0e}"
+    )
 
 
 def _ends(band: Band, index: int, scale: float) -> str:
@@ -347,7 +352,7 @@ def _lead_of_scores(prediction: Prediction) -> str:
         stress_words = f" ({name})" if len(prediction.stresses) > 1 else ""
         findings = [
             f"{row['inside']:.0%} lie in the {100 * prediction.prob:.4g} % band ({_of(prediction, row)}), "
-            f"whose mean errs by {_share(row['error'])} of the stress"
+            f"whose median errs by {_share(row['error'])} of the stress"
             for row in rows.to_dict("records")
         ]
         count = rows["count"].iloc[0]
@@ -358,16 +363,15 @@ def _lead_of_scores(prediction: Prediction) -> str:
 
 
 def _lead_of_bands(prediction: Prediction) -> str:
-    """Return what the numbers do not say: the stress at the end of the measured range, or that of the material alone.
+    """Return what the numbers do not say: the stress farthest from rest, extrapolated, or that of the material alone.
 
-    The numbers are of the point farthest from rest, with the discrepancy where the run has one.
+    The numbers are of the end of what is calibrated, with the discrepancy where the run has one.
     """
-    calibrated, change = np.flatnonzero(prediction.is_calibrated), _changes(prediction)
-    farthest, kind = int(change.argmax()), _kind(prediction, prediction.kinds[0])
-    index = int(calibrated[change[calibrated].argmax()]) if len(calibrated) else farthest
+    index, change, kind = _calibrated_end(prediction), _changes(prediction), _kind(prediction, prediction.kinds[0])
+    farthest = int(change.argmax())
     if change[index] < change[farthest]:
-        stresses = _stresses_at(prediction, index, prediction.kinds[0])
-        return f"At {_point(prediction, index)} in mode {prediction.mode.name}, {stresses}: {kind}."
+        stresses = _stresses_at(prediction, farthest, prediction.kinds[0])
+        return f"Extrapolated to {_point(prediction, farthest)}, {stresses}: {kind}."
     if not prediction.kinds[0]:
         return f"Predicted by {kind}."
     alone = _kind(prediction, kind=False)
@@ -382,6 +386,14 @@ def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
         median, ends = (words(band, index, scale) for words in (_median, _ends))
         texts.append(f"the {name} is {median} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
     return " and ".join(texts)
+
+
+def _calibrated_end(prediction: Prediction) -> int:
+    """Return which calibrated point is farthest from rest, or which of all where none is calibrated."""
+    change = _changes(prediction)
+    return int(
+        np.where(prediction.is_calibrated, change, -1.0).argmax() if prediction.is_calibrated.any() else change.argmax()
+    )
 
 
 def _changes(prediction: Prediction) -> FloatArray:

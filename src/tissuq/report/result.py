@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from math import isnan
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
-from tissuq.assessment.answer import Use, Verdict
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.report.tables import interval, known_number, significant
 from tissuq.result_warning import Severity, most_severe_first
 

@@ -56,6 +56,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
     """Return the answer of a fit alone, which is there before anything is assessed."""
     answer, unit, lag = study.answer, study.unit, study.posteriors[study.main].model.fitted_errors.lag
     correlated = f" The errors of consecutive measurements are correlated (lag-1 correlation {lag:.2f})." if lag else ""
+    of_law = f" {answer.law}" if answer.law else ""
     along_axes = f" {answer.sheet.in_words(unit)}" if answer.sheet else ""
     return Result(
         command="fit",
@@ -64,8 +65,9 @@ def specimen_answer(study: SpecimenStudy) -> Result:
         numbers=tuple(
             Number(name, mean / unit.to_mpa, low / unit.to_mpa, high / unit.to_mpa, unit.name)
             for name, mean, low, high in answer.estimates
-        ),
-        finding=f"The intervals are of {answer.meaning}.{correlated}{along_axes}",
+        )
+        + _over_discrepancies(study),
+        finding=f"{answer.meaning_in_words}{correlated}{along_axes}{of_law}",
         uses=answer.uses,
         next_step=answer.next_step.shell,
         warnings=tuple(study.warnings),
@@ -191,12 +193,28 @@ def _extent(assessments: Mapping[str, Assessment]) -> Section:
     return Section("To what extent the material is wrong", tuple(blocks))
 
 
+def _uncut(study: SpecimenStudy) -> list[str]:
+    """Return the discrepancies whose posteriors no bound of a prior cuts, or all where each is cut."""
+    return [name for name in study.posteriors if not study.is_cut_by_prior(name)] or list(study.posteriors)
+
+
+def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:
+    """Return between what the mean of the headline parameter lies with several discrepancies; nothing of one."""
+    if len(study.posteriors) == 1:
+        return ()
+    means = {name: study.posteriors[name].marginals[study.headline].mean / study.unit.to_mpa for name in _uncut(study)}
+    low, high = min(means, key=lambda name: means[name]), max(means, key=lambda name: means[name])
+    ends = f"{significant(means[low])} to {significant(means[high])} {study.unit.name}"
+    name = f"{study.headline}, mean with {len(means)} discrepancies"
+    return (Number(name, ends, remark=f"from '{low}' to '{high}'"),)
+
+
 def _comparison(summary: list[Row], study: SpecimenStudy) -> str:
     """Return what several discrepancies say of the headline parameter, in a sentence or two."""
     scale, unit = study.unit.to_mpa, study.unit.name
-    rows = [row for row in summary if not study.is_cut_by_prior(row["formulation"])] or summary
-    left_out = len(summary) - len(rows)
-    name = study.headline
+    uncut, name = _uncut(study), study.headline
+    rows = [row for row in summary if row["formulation"] in uncut]
+    left_out = [discrepancy for discrepancy in study.posteriors if discrepancy not in uncut]
     means = [row[f"{name}_mean"] / scale for row in rows]
     overlap = max(row[f"{name}_hdi_low"] for row in rows) <= min(row[f"{name}_hdi_high"] for row in rows)
     verdict = (
@@ -208,7 +226,7 @@ def _comparison(summary: list[Row], study: SpecimenStudy) -> str:
         f"With {len(rows)} ways to account for model uncertainty, the mean of {name} ranges from "
         f"{significant(min(means))} to {significant(max(means))} {unit}; {verdict}."
         + (
-            f" ({left_out} more left out here, because a prior bound determines part of the result.)"
+            f" (Left out here, because a prior bound determines part of the result: {', '.join(left_out)}.)"
             if left_out
             else ""
         )
@@ -224,4 +242,4 @@ def _of_what(study: SpecimenStudy) -> str:
     if len(names) == 1:
         return ""
     of_names = "; ".join(f"those of {', '.join(group)} are of {meaning}" for meaning, group in names.items())
-    return f" The intervals are not of the same, so do not compare their widths: {of_names}."
+    return f" The intervals mean different things, so do not compare their widths: {of_names}."

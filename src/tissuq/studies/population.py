@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, cast
@@ -13,11 +14,11 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
-from tissuq.experiments.reading.notes import each_once
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
 from tissuq.population.covariates import covariates_of
+from tissuq.result_warning import merged, most_severe_first
 from tissuq.studies.population_settings import PopulationSettings
 
 if TYPE_CHECKING:
@@ -116,8 +117,8 @@ def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
 
 def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]:
     """Return the warnings about the files, each once with the specimens that it concerns."""
-    pairs = ((name, text) for name, of_one in readings.items() for reading in of_one for text in data_warnings(reading))
-    messages = each_once(pairs, len(readings), "all specimens")
+    of_specimens = {name: chain.from_iterable(map(data_warnings, of_one)) for name, of_one in readings.items()}
+    messages = most_severe_first(merged(of_specimens, everyone="all specimens"))
     omitted = len(messages) - MAX_DATA_WARNINGS
     return (
         *messages[:MAX_DATA_WARNINGS],

@@ -12,12 +12,11 @@ from typing import Any
 
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.assessment.answer import Answer
+from tissuq.assessment.measurements import labels_of_tests
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.findings import STRESS_AT_REST, data_warnings
-from tissuq.experiments.reading.notes import each_once
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import (
@@ -239,18 +238,10 @@ def _options(
 
 
 def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:
-    """Return the warnings about the files, each once, with the names of its tests if there are several.
-
-    A unit that was assumed may make the answer wrong by a factor of 100 or 1000.
-    """
-    messages = ((reading.experiment.name, text) for reading in readings for text in data_warnings(reading))
-    return tuple(map(_warning_of_file, each_once(messages, len(readings), "all tests")))
-
-
-def _warning_of_file(text: str) -> ResultWarning:
-    if is_doubtful(text):
-        return ResultWarning(text, "doubtful-reading", Severity.PROBLEM)
-    return ResultWarning(text, "stress-at-rest" if STRESS_AT_REST in text else "measurements")
+    """Return the warnings about the files, each once, with the names of its tests if there are several."""
+    names = labels_of_tests([reading.experiment for reading in readings])
+    of_tests = zip(names, map(data_warnings, readings), strict=True)
+    return tuple(merged(dict(of_tests), everyone="all tests"))
 
 
 def _names(settings: SpecimenSettings) -> list[str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import chain
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 
 from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.load_cell import scatter_of_neighbours
@@ -19,8 +20,9 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.units import stress_unit
+from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["STRESS_AT_REST", "data_warnings"]
+__all__ = ["data_warnings"]
 
 MANY_ROWS = 10_000
 """Rows from which thinning is worth a word."""
@@ -43,19 +45,30 @@ MIN_CONTRACTION = 0.2
 isotropic one."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
-STRESS_AT_REST = "the stress is already"
-"""Words of a warning about a curve that does not begin at zero."""
+REGION_CODES: Mapping[str, tuple[str, Severity]] = {
+    "slack": ("slack", Severity.CAUTION),
+    "resolution": ("measurements", Severity.NOTE),  # a fit allows for it
+}
+"""Code and severity of the warnings about kinds of regions, where they are no cautions about the measurements."""
 DISTURBED = {"rupture", "hold", "slip"}
 """What makes loading and unloading differ without hysteresis."""
 
 
-def data_warnings(reading: Reading) -> tuple[str, ...]:
-    """Return what a person should look at before a fit, of each stress: what was assumed comes first."""
+def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
+    """Return what a person should look at before a fit, of each stress: what was assumed comes first.
+
+    A unit that was assumed may make the answer wrong by a factor of 100 or 1000.
+    """
     labels = reading.used.labels
-    texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
-    kinds = dict.fromkeys(region.kind for regions in reading.regions for region in regions)
-    happened = (labelled(labels, [_of_kind(regions, kind) for regions in reading.regions]) for kind in kinds)
-    return (*reading.notes, *filter(None, chain.from_iterable((*happened, *texts))))
+    doubtful = "doubtful-reading", Severity.PROBLEM
+    warnings = [ResultWarning(text, *doubtful if is_doubtful(text) else CAUTION) for text in reading.notes]
+    for kind in dict.fromkeys(region.kind for regions in reading.regions for region in regions):
+        texts = labelled(labels, [_of_kind(regions, kind) for regions in reading.regions])
+        warnings += [ResultWarning(text, *REGION_CODES.get(kind, CAUTION)) for text in texts if text]
+    for check, code_and_severity in CHECKS.items():
+        texts = labelled(labels, [check(reading, number) for number in range(len(labels))])
+        warnings += [ResultWarning(text, *code_and_severity) for text in texts if text]
+    return tuple(warnings)
 
 
 def _of_kind(regions: Sequence[Region], kind: str) -> str:
@@ -124,22 +137,36 @@ def _hysteresis(reading: Reading, number: int) -> str:
     )
 
 
-def _reference(reading: Reading, number: int) -> str:
-    stretch, stress = reading.used.stretch[number], reading.used.stress[number]
-    unit, control = stress_unit(reading.experiment.stress_unit), reading.tested[number].control
+def _nearest_to_reference(reading: Reading) -> tuple[NDArray[np.float64], int]:
+    """Return how far every measurement is from the reference, and which is the nearest."""
     mode, points = reading.experiment.mode, reading.experiment.stretch
-    change = np.abs((points - mode.reference).reshape(len(stress), -1)).max(axis=1)
-    nearest = int(np.argmin(change))
-    gap, furthest = float(change[nearest]), float(change.max())
-    if gap > NOTABLE_SHARE * furthest:
-        if points.ndim == 1 and points.min() < mode.reference < points.max():
-            return ""  # between measurements, which says neither where the test begins nor what its zero is
-        return f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
+    change = np.abs((points - mode.reference).reshape(len(points), -1)).max(axis=1)
+    return change, int(np.argmin(change))
+
+
+def _reference(reading: Reading, number: int) -> str:
+    change, nearest = _nearest_to_reference(reading)
+    if change[nearest] <= NOTABLE_SHARE * change.max():
+        return ""
+    control, points = reading.tested[number].control, reading.experiment.stretch
+    if points.ndim == 1 and points.min() < reading.experiment.mode.reference < points.max():
+        return ""  # between measurements, which says neither where the test begins nor what its zero is
+    begin = reading.used.stretch[number][nearest]
+    return f"the measurements begin at {control.name} {begin:.4g}, not near {control.reference:g}."
+
+
+def _stress_at_rest(reading: Reading, number: int) -> str:
+    change, nearest = _nearest_to_reference(reading)
+    gap = float(change[nearest])
+    if gap > NOTABLE_SHARE * change.max():
+        return ""
+    stretch, stress, points = reading.used.stretch[number], reading.used.stress[number], reading.experiment.stretch
+    unit, control = stress_unit(reading.experiment.stress_unit), reading.tested[number].control
     at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
     at_rest, standard_error = at_reference, scatter_of_neighbours(stress)
     if points.ndim == 1 and gap > 0:  # what a line through the measurements next to the reference has there
         rows = change <= max(ROWS_OF_LINE * gap, np.sort(change)[min(ROWS_OF_LINE, len(change)) - 1])
-        away = points[rows] - mode.reference
+        away = points[rows] - reading.experiment.mode.reference
         at_rest = float(Polynomial.fit(away, stress[rows], 1)(0.0))
         standard_error *= np.sqrt(1 / len(away) + away.mean() ** 2 / ((away - away.mean()) ** 2).sum())
     sign = np.sign(at_reference)
@@ -147,7 +174,7 @@ def _reference(reading: Reading, number: int) -> str:
         return ""
     zero = _load_zero(reading, number, nearest, at_rest / at_reference)
     return (
-        f"at {control.name} {stretch[nearest]:.4g} {STRESS_AT_REST} {at_reference / unit.to_mpa:.3g} {unit.name}, "
+        f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
         f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which --load-zero "
         f"{zero} takes off. A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
@@ -224,13 +251,15 @@ def _is_held(reading: Reading, number: int, column: int) -> bool:
     return ratio + STANDARD_ERRORS * error < MIN_CONTRACTION
 
 
-CHECKS: tuple[Callable[[Reading, int], str], ...] = (
-    _other_axis,
-    _size,
-    _stretch_size,
-    _cycles,
-    _hysteresis,
-    _reference,
-    _diameter,
-    _many,
-)
+CAUTION, NOTE = ("measurements", Severity.CAUTION), ("measurements", Severity.NOTE)
+CHECKS: Mapping[Callable[[Reading, int], str], tuple[str, Severity]] = {
+    _other_axis: CAUTION,
+    _size: CAUTION,
+    _stretch_size: CAUTION,
+    _cycles: CAUTION,
+    _hysteresis: CAUTION,
+    _stress_at_rest: ("stress-at-rest", Severity.CAUTION),
+    _reference: NOTE,
+    _diameter: CAUTION,
+    _many: NOTE,
+}

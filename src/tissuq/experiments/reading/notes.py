@@ -1,10 +1,10 @@
-"""Texts about several tests or fits, each once with the names of those that it concerns."""
+"""Texts about several tests, with the names of those that they concern."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["concerned", "each_once"]
+__all__ = ["concerned"]
 
 
 def concerned(messages: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
@@ -21,17 +21,3 @@ def concerned(messages: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
         if name not in of_text:
             of_text.append(name)
     return names
-
-
-def each_once(messages: Iterable[tuple[str, str]], count: int, everyone: str) -> list[str]:
-    """Return every text once, after the names that it concerns, or after a word where these are all of so many.
-
-    Examples
-    --------
-    >>> each_once([("A", "torn"), ("B", "torn"), ("B", "slack")], 2, "all tests")
-    ['all tests: torn', 'B: slack']
-    """
-    return [
-        f"{everyone if len(names) == count else ', '.join(names)}: {text}" if count > 1 else text
-        for text, names in concerned(messages).items()
-    ]

@@ -20,7 +20,7 @@ from tissuq.parameters.priors import Prior, Uniform, prior_from
 from tissuq.posterior.fitting import fit, fit_many
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
-from tissuq.result_warning import ResultWarning, merged
+from tissuq.result_warning import ResultWarning, Severity, merged
 from tissuq.studies.campaign_settings import PaperOptions
 from tissuq.validation.paper.claims import Finding, Findings, Verdict, find, judge
 
@@ -181,9 +181,13 @@ class PaperStudy:
 
     @property
     def warnings(self) -> list[ResultWarning]:
-        """Warnings about the fits, one of each kind with the formulations that it concerns."""
+        """Warnings about the fits, one of each kind with the formulations that it concerns.
+
+        They are notes: how these fits are wrong is what the study is about, and nobody is to act on it.
+        """
         sampled = {f"{name} (nuts)": fit for name, fit in self.sampled.items()}
-        return merged({name: fit.posterior.warnings for name, fit in {**self.main, **sampled}.items()})
+        texts = merged({name: fit.posterior.warnings for name, fit in {**self.main, **sampled}.items()})
+        return [text if text.severity is Severity.PROBLEM else text.as_note() for text in texts]
 
     @property
     def not_converged(self) -> list[str]:

@@ -1,0 +1,111 @@
+"""The one thing to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from tissuq.assessment.uses import SPREAD, Use, Verdict
+from tissuq.inference.solution import Solution
+from tissuq.result_warning import ResultWarning, Severity
+
+__all__ = ["Step", "next_step"]
+
+
+class Step(NamedTuple):
+    """What to do next, as typed in a shell (``{run}`` stands for the folder of the run) and in Python."""
+
+    shell: str
+    python: str
+
+
+STEPS: Mapping[str, Step] = {
+    "auto": Step(
+        "let the data decide how wrong the material is: fit again with --discrepancy auto.",
+        'let the data decide how wrong the material is: fit again with discrepancy="auto".',
+    ),
+    "problem": Step("act on the first warning: it says what to do.", "act on the first warning: it says what to do."),
+    "measurements": Step(*["act on the warning about the measurements: it says what to do."] * 2),
+    "slack": Step(
+        "count from where load begins: fit again with --preload auto.",
+        'count from where load begins: read again with preload="auto".',
+    ),
+    "fibres": Step(*["fit a law with fibres, which has the preferred direction: tissuq materials lists them."] * 2),
+    "zero": Step(
+        "take off what the load cell shows at rest: fit again with --load-zero first, or as the first warning says.",
+        'take off what the load cell shows at rest: fit again with load_zero="first", or as the first warning says.',
+    ),
+    "few": Step(
+        "measure at more stretches, from near rest onward: tissuq design {run} says which.",
+        "measure at more stretches, from near rest onward: posterior.design() says which.",
+    ),
+    "specimens": Step(
+        "measure further specimens: how much they differ is assumed so far, and sets the width.",
+        "measure further specimens: how much they differ is assumed so far, and sets the width.",
+    ),
+    "law": Step(
+        "see whether another law describes the measurements by itself: fit again with --material all.",
+        "see whether another law describes the measurements by itself: tq.fit_laws.",
+    ),
+    "design": Step(
+        "see which test would make it narrower: tissuq design {run}",
+        "see which test would make it narrower: posterior.design()",
+    ),
+    "apart": Step(*["find out why the tests contradict each other, as the warning says."] * 2),
+    "curve": Step(*["act on the warning about the measured curve, which the fit does not follow."] * 2),
+    "second mode": Step(
+        "measure a second loading mode; tissuq design {run} says which helps most.",
+        "measure a second loading mode; posterior.design() says which helps most.",
+    ),
+    "stable": Step(
+        "restrict the fit to stable materials: fit again with --stable-in all.",
+        'restrict the fit to stable materials: fit again with stable_in="all".',
+    ),
+    "export": Step(
+        "take it into finite elements: tissuq export {run} --format abaqus",
+        "take it into finite elements: posterior.ensemble(20), tq.write_cards",
+    ),
+}
+"""What may be done next."""
+STEPS_OF_WARNINGS: Mapping[str, str] = {
+    "stress-at-rest": "zero",
+    "tests-apart": "apart",
+    "contradicting-tests": "apart",
+    "unmodelled-curve": "curve",
+    "measurements": "measurements",
+    "unstable": "stable",
+    "few-measurements": "few",
+    "slack": "slack",
+}
+"""Step for a caution of each code: before further tests, for the severest that has one."""
+ONLY_IN_DOUBT = {"measurements": Verdict.CARE, "slack": Verdict.CARE, "few-measurements": Verdict.NO}
+"""Of some, the best verdict on the modulus at which they are the next step."""
+
+
+def next_step(
+    solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning], *, is_law_wrong: bool = False
+) -> Step:
+    """Return the one thing to do next, the severest of the warnings first."""
+    if any(warning.severity is Severity.PROBLEM for warning in warnings):
+        return STEPS["problem"]
+    reporting, _, others, simulating = (use.verdict for use in uses)
+    model, verdicts = solution.model, list(Verdict)
+    has_stress_at_rest = any(warning.code == "stress-at-rest" for warning in warnings)
+    is_plain_law = solution.is_of_data and not model.energy_symbols and model.material.is_isotropic
+    if is_plain_law and not has_stress_at_rest:
+        return STEPS["auto"]
+    for warning in warnings:
+        is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))
+        if warning.severity is Severity.CAUTION and warning.code in STEPS_OF_WARNINGS and is_due:
+            return STEPS[STEPS_OF_WARNINGS[warning.code]]
+    if not solution.is_of_data:
+        return STEPS["export"]
+    if solution.is_directed:
+        return STEPS["fibres"]
+    if reporting is not Verdict.YES:
+        if SPREAD in uses[0].reason:
+            return STEPS["specimens"]
+        return STEPS["law" if is_law_wrong and model.material.is_isotropic else "design"]
+    if others is not Verdict.YES and len(model.experiment.modes) == 1:
+        return STEPS["second mode"]
+    return STEPS["export" if simulating is not Verdict.NO else "design"]

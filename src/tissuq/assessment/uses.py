@@ -1,0 +1,268 @@
+"""For what a result can be used: reporting the modulus, predicting tests and other modes, finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.stability import StableRange
+from tissuq.errors import TissuqError
+from tissuq.experiments.curve import Curve
+from tissuq.inference.marginal import Marginal
+from tissuq.inference.solution import Solution
+from tissuq.model.tolerances import TISSUE
+from tissuq.prediction.bands import Band, predict_band
+from tissuq.result_warning import ResultWarning
+
+__all__ = ["MIN_OFTEN_STABLE", "MIN_STABLE", "PRECISE", "SPREAD", "Use", "Verdict", "uses_of"]
+
+PRECISE, USEFUL = 0.2, 0.5
+"""Half widths of 95 % intervals, over the mean, up to which a number is precise, and of use."""
+MIN_INSIDE = 0.9
+"""Share of the measurements inside their 95 % bands below which these do not describe the test."""
+MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
+"""Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
+NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
+"""Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
+SPREAD = "assumed spread between specimens"
+SKEW = 1.25
+"""Ratio of the parts of an interval above and below the mean up to which one number stands for both."""
+GRID_POINTS = 9
+"""Stretches at which the width of a band is looked at."""
+
+
+class Verdict(StrEnum):
+    """Whether a result can be used for something, from the best to the worst."""
+
+    YES = "yes"
+    CARE = "with care"
+    NO = "no"
+
+
+class Use(NamedTuple):
+    """For what a result can be used, or not, and why."""
+
+    purpose: str
+    verdict: Verdict
+    reason: str
+
+
+def uses_of(
+    solution: Solution,
+    stiffness: Marginal,
+    ranges: Mapping[str, StableRange],
+    warnings: Sequence[ResultWarning],
+    inside: NDArray[np.bool_],
+) -> tuple[Use, ...]:
+    """Return for what a posterior with this initial shear modulus can be used; the others as in `answer_of`."""
+    codes = {warning.code for warning in warnings}
+    own_tests = _own_tests(solution, inside, codes)
+    other_modes = _other_modes(solution, ranges, codes, own_tests)
+    return (
+        Use("report the modulus", *_reporting(solution, stiffness, codes, warnings)),
+        Use("predict these tests", *own_tests),
+        Use("predict other loading modes", *other_modes),
+        Use("simulate with finite elements", *_simulating(solution, ranges, other_modes, codes)),
+    )
+
+
+def _reporting(
+    solution: Solution, stiffness: Marginal, codes: Collection[str], warnings: Sequence[ResultWarning]
+) -> tuple[Verdict, str]:
+    """Return whether the modulus can be reported."""
+    symbols = modulus_symbols(solution.model)
+    is_cut = any(w.code == "prior-bound" and any(f"{symbol} (" in w for symbol in symbols) for w in warnings)
+    reasons_against = {
+        "sampling has not converged": "not-converged" in codes,
+        "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
+        "there is stress at rest, so that it may be off by far more than its interval": "stress-at-rest" in codes,
+        "a bound of its prior, not the data, determines it": is_cut,
+        "the tests contradict each other, so that it may be that of none of them": "tests-apart" in codes,
+        "the fitted curve departs from the measured one, and the interval does not include that": (
+            "unmodelled-curve" in codes
+        ),
+        "the discrepancy aims at the best fit, not at the modulus": "best-fit-target" in codes,
+    }
+    for reason, applies in reasons_against.items():
+        if applies:
+            return Verdict.NO, reason
+    carried = abs(shares_of_discrepancy(solution)[1][0])
+    low, high = stiffness.hdi()
+    half_width = (high - low) / 2 / abs(stiffness.mean)
+    verdict, width = _precision(half_width)
+    if half_width <= 1:
+        width = f"known to {_ends_in_words(*((end - stiffness.mean) / abs(stiffness.mean) for end in (low, high)))}"
+    if carried > PRECISE:
+        return Verdict.NO, f"the discrepancy carries {carried:.0%} of the initial stiffness, by which it may be off"
+    if not solution.model.discrepancy.parameters:
+        return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
+    if "contradicting-tests" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
+    if "prior-dominates" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
+    if "not-near-reference" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
+    model = solution.model
+    if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
+        common = SPREAD if model.tolerances.estimand == TISSUE else "assumed error of the stress as a whole"
+        return verdict, f"{width}, nearly all of it the {common}"
+    return verdict, width
+
+
+def _precision(half_width: float) -> tuple[Verdict, str]:
+    """Return a verdict on the half width of an interval over its middle, and the width in words."""
+    verdict = Verdict.YES if half_width <= PRECISE else Verdict.CARE if half_width <= USEFUL else Verdict.NO
+    return verdict, f"known to {_percent(half_width)}"
+
+
+def _percent(half_width: float) -> str:
+    if not half_width <= 1:
+        return "no better than ± 100 %"
+    return f"± {100 * half_width:.0f} %" if half_width >= 0.1 else f"± {max(100 * half_width, 0.1):.2g} %"
+
+
+def _ends_in_words(low: float, high: float) -> str:
+    """Return the ends of an interval from the mean, over the mean: as one number where they are about the same."""
+    if max(-low, high) <= SKEW * min(-low, high):
+        return _percent((high - low) / 2)
+    return f"within {100 * low:.0f} % and +{100 * high:.0f} %".replace("-", "−")
+
+
+def _worst(*verdicts: Verdict) -> Verdict:
+    return max(verdicts, key=list(Verdict).index)
+
+
+def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[str]) -> tuple[Verdict, str]:
+    """Return whether the measured tests are described, over the range in which they were measured."""
+    if not solution.is_of_data:
+        return Verdict.NO, "no test was measured of what this posterior describes"
+    held, count = int(inside.sum()), len(inside)
+    counts = f"{held} of {count} measurements inside the band"
+    try:
+        widths = [_relative_half_width(_band_of(solution, curve)) for curve in solution.model.experiment.curves]
+    except TissuqError as error:
+        return Verdict.NO, str(error)
+    verdict, width = _precision(max(widths))
+    if held < MIN_INSIDE * count:
+        return Verdict.NO, f"only {counts}"
+    names = [curve.name for curve in solution.model.experiment.curves]
+    where = f", least in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
+    sentence = f"stress {width} on average where it was measured{where}; {counts}"
+    for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
+                         ("stress-at-rest", "there is stress at rest, where the material has none"),
+                         ("tests-apart", "the tests contradict each other"),
+                         ("contradicting-tests", "the tests contradict each other")):  # fmt: skip
+        if code in codes:
+            return _worst(verdict, Verdict.CARE), f"{sentence}, but {reason}"
+    return verdict, sentence
+
+
+def _band_of(solution: Solution, curve: Curve) -> Band:
+    """Return the band of the stress itself at measured points that span a curve."""
+    order = np.argsort(curve.abscissa, kind="stable")
+    rows = order[np.linspace(0, len(order) - 1, min(GRID_POINTS, len(order))).astype(int)]
+    return predict_band(solution, curve.points[rows], noise=False, mode=curve.mode, channel=curve.channel)
+
+
+def _relative_half_width(band: Band) -> float:
+    """Return the root mean square of half the width of a band over that of its median."""
+    size = float(np.sqrt(np.mean(band.median**2)))
+    return float(np.sqrt(np.mean((band.high - band.low) ** 2))) / 2 / size if size else np.inf
+
+
+def _other_modes(
+    solution: Solution, ranges: Mapping[str, StableRange], codes: Collection[str], own_tests: tuple[Verdict, str]
+) -> tuple[Verdict, str]:
+    """Return whether loading modes that were not measured can be predicted, within the measured invariants."""
+    model = solution.model
+    measured = {mode.name for mode in model.experiment.modes}
+    if not model.discrepancy.is_energy and model.discrepancy.parameters:
+        return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' belongs to the stress of the measured test"
+    if "unmodelled-curve" in codes:
+        return Verdict.NO, "the material alone does not follow the measured curve"
+    others = {name: stable_range for name, stable_range in ranges.items() if name not in measured}
+    if not others:
+        if not ranges:
+            return Verdict.CARE, "not looked at for this material"
+        return own_tests[0], "uniaxial, equibiaxial and planar stress were measured, so that the line above holds"
+    try:
+        widths = {
+            name: [
+                _relative_half_width(predict_band(solution, stretch, noise=False, mode=name))
+                for stretch in _compression_and_tension(stable_range)
+            ]
+            for name, stable_range in others.items()
+        }
+    except TissuqError as error:
+        return Verdict.NO, str(error)
+    verdict = _worst(*(_precision(width)[0] for of_mode in widths.values() for width in of_mode))
+    of_modes = ", ".join(f"{name} stress {_signed_percents(of_mode)}" for name, of_mode in widths.items())
+    origin = "measured" if solution.is_of_data else "stated"
+    sentence = f"within the strains that were {origin}: {of_modes}"
+    is_one_path = len(measured) == 1 and len(model.experiment.modes[0].controls) == 1
+    if solution.is_of_data and is_one_path:
+        return _worst(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
+    return verdict, sentence
+
+
+def _compression_and_tension(stable_range: StableRange) -> list[NDArray[np.float64]]:
+    """Return stretches over a range, those below 1 apart from those above it where it has both."""
+    low, high = stable_range.low, stable_range.high
+    ends = [(low, 1.0), (1.0, high)] if low < 1 < high else [(low, high)]
+    return [np.linspace(*pair, GRID_POINTS) for pair in ends]
+
+
+def _signed_percents(widths: Sequence[float]) -> str:
+    """Return half widths in words: that of the range, or those of compression and tension where they differ."""
+    if len(texts := list(dict.fromkeys(map(_percent, widths)))) == 1:
+        return texts[0]
+    return f"{texts[1]} in tension and {texts[0]} in compression"
+
+
+def _simulating(
+    solution: Solution,
+    ranges: Mapping[str, StableRange],
+    other_modes: tuple[Verdict, str],
+    codes: Collection[str],
+) -> tuple[Verdict, str]:
+    """Return whether draws of material and discrepancy serve finite elements."""
+    model = solution.model
+    if not model.discrepancy.is_energy:
+        return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' is an error of the stress and no material"
+    if solution.is_directed:
+        return Verdict.NO, (
+            "the tissue has a preferred direction, which cards of this law have not; fit a law with fibres "
+            "(tissuq materials)"
+        )
+    if "unmodelled-curve" in codes:
+        return Verdict.NO, "the fitted curve departs from the measured one"
+    if not model.material.is_isotropic and model.energy_symbols:
+        if len(set(model.experiment.states.paths)) == 1:
+            return (
+                Verdict.NO,
+                "one stress was measured, and neither fibres nor the free energy beside them follow from it",
+            )
+        return Verdict.CARE, "fibres beside a free energy have cards in FEBio alone, and need axes in the model"
+    if not model.material.is_isotropic:
+        return Verdict.CARE, "fibres have cards where a code has their law, and need axes in the model"
+    if not ranges:
+        return Verdict.CARE, "whether it is stable cannot be computed for this material"
+    worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
+    share = f"{worst.probability:.0%} of the draws are stable over the measured range"
+    if worst.probability < MIN_STABLE:
+        share += f", least in {worst.mode} loading"
+    if worst.probability < MIN_OFTEN_STABLE:
+        return Verdict.NO, share
+    if other_modes[0] is Verdict.NO:
+        also = "" if worst.probability >= MIN_STABLE else f"; {share}"
+        return Verdict.NO, f"the stress in other loading modes is not known well enough{also}"
+    stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
+    if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
+        return Verdict.CARE, f"no better than other loading modes are known; {share}"
+    return _worst(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"
