@@ -189,6 +189,20 @@ def test_two_directions_of_one_specimen_that_differ_by_a_factor_give_no_modulus(
     assert verdicts(posterior)[0] == Verdict.NO
 
 
+def test_of_a_cycle_whose_residuals_are_correlated_one_branch_is_advised():
+    way = np.r_[np.linspace(1.02, 1.3, 40), np.linspace(1.3, 1.02, 40)]
+    stress = (way - way**-2) * np.r_[np.ones(40), np.full(40, 0.8)]
+    options = {"noise_sd": 0.01, "discrepancy": "auto", "tolerances": "as-tested"}
+    advice = {}
+    for name, rows in {"cycle": slice(None), "branch": slice(40)}.items():
+        waves = 0.03 * np.sin(80 * way[rows]) if name == "branch" else 0
+        warnings = tq.fit(tq.Experiment("uniaxial", way[rows], stress[rows] + waves), **options).warnings
+        advice[name] = next(warning.shell for warning in warnings if warning.code == "correlated-residuals")
+    assert "--branch loading" in advice["cycle"]
+    assert "--branch" not in advice["branch"]
+    assert "--noise autoregressive" in advice["branch"]
+
+
 def test_tests_that_differ_as_specimens_do_are_not_said_to_contradict_each_other():
     codes = {warning.code for warning in tq.fit(in_shear_and_tension(1.2)).warnings}
     assert not codes & {"tests-apart", "contradicting-tests"}

@@ -114,7 +114,9 @@ def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
     unloads = np.diff(stretch, append=1.0) < 0
     stress = 1e3 * neo_hookean(stretch) * np.where(unloads, 0.7, 1.0)
     text = notes(inspected(stretch, stress))
-    assert "all 2 cycles are used; to fit one, give --cycle last" in text
+    assert "all 2 cycles are used, and loading and unloading differ by up to" in text
+    assert "give --cycle last --branch loading." in text
+    assert text.count("loading and unloading differ") == 1
     assert "% of the largest stress, and an elastic material has one curve" in text
     assert inspected(stretch, stress, cycle="last", branch="loading").warnings == ()
 

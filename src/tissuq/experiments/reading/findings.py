@@ -50,6 +50,10 @@ REGION_CODES: Mapping[str, tuple[str, Severity]] = {
     "resolution": ("measurements", Severity.NOTE),  # a fit allows for it
 }
 """Code and severity of the warnings about kinds of regions, where they are no cautions about the measurements."""
+HYSTERESIS = (
+    "loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one curve"
+)
+ONE_BRANCH = "--cycle last --branch loading"
 DISTURBED = {"rupture", "hold", "slip"}
 """What makes loading and unloading differ without hysteresis."""
 
@@ -99,8 +103,12 @@ def _cycles(reading: Reading, number: int) -> str:
             "of those with the same ratio, give --leave-out with their lines."
         )
     numbered = advice_on_numbered_tests(reading.table, reading.choices, reading.recorded.course)
-    advice = "; ".join(filter(None, ("to fit one, give --cycle last, first or a number", numbered)))
-    return f"all {count} cycles are used; {advice}."
+    if share := _hysteresis_share(reading, number):
+        seen = f"all {count} cycles are used, and {HYSTERESIS.format(share=share)}"
+        advice = f"to fit one branch of one cycle, give {ONE_BRANCH}"
+    else:
+        seen, advice = f"all {count} cycles are used", "to fit one, give --cycle last, first or a number"
+    return f"{seen}; {'; '.join(filter(None, (advice, numbered)))}."
 
 
 def _ratios(reading: Reading) -> int:
@@ -111,13 +119,21 @@ def _ratios(reading: Reading) -> int:
 
 
 def _hysteresis(reading: Reading, number: int) -> str:
-    if DISTURBED.intersection(region.kind for region in reading.regions[number]):
+    share = _hysteresis_share(reading, number)
+    if not share or ONE_BRANCH in _cycles(reading, number):
         return ""
+    return f"{HYSTERESIS.format(share=share)}; to fit one of them, give --branch loading or unloading."
+
+
+def _hysteresis_share(reading: Reading, number: int) -> float:
+    """Return by how much loading and unloading differ, over the largest stress; zero where that is not worth a word."""
+    if DISTURBED.intersection(region.kind for region in reading.regions[number]):
+        return 0.0
     course, stress = reading.used.course, reading.used.stress[number]
     cycle = reading.used_cycles[-1]
     branches = [cycle.rows("loading"), cycle.rows("unloading")]
     if min(map(len, branches)) < MIN_ROWS_PER_CYCLE / 2:
-        return ""
+        return 0.0
     ordered = [rows[np.argsort(course[rows])] for rows in branches]
     low = max(course[rows[0]] for rows in ordered)
     high = min(course[rows[-1]] for rows in ordered)
@@ -125,16 +141,11 @@ def _hysteresis(reading: Reading, number: int) -> str:
         min(np.count_nonzero((course[rows] >= low) & (course[rows] <= high)) for rows in ordered)
         < MIN_ROWS_PER_CYCLE / 2
     ):
-        return ""  # tension and compression one after another, of which a jump joins the two
+        return 0.0  # tension and compression one after another, of which a jump joins the two
     grid = np.linspace(low, high, 50)
     loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
     share = float(np.abs(loading - unloading).max() / max(np.abs(stress).max(), np.finfo(float).tiny))
-    if share < NOTABLE_SHARE:
-        return ""
-    return (
-        f"loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one "
-        "curve; to fit one of them, give --branch loading or unloading."
-    )
+    return share if share >= NOTABLE_SHARE else 0.0
 
 
 def _nearest_to_reference(reading: Reading) -> tuple[NDArray[np.float64], int]:
