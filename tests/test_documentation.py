@@ -80,6 +80,15 @@ def test_every_public_name_stands_once_in_the_reference():
     assert all(f"[`{name}`][tissuq.{name}]" in pages["reference/index.md"] for name in tissuq.__all__)
 
 
+def test_names_in_documents_and_examples_are_public():
+    """Others are attributes only after something else has imported their module."""
+    files = [*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *(ROOT / "src").rglob("*.py")]
+    texts = {str(file): file.read_text(encoding="utf-8") for file in files}
+    named = {(name, file) for file, text in texts.items() for name in re.findall(r"\btq\.(\w+)", text)}
+    assert {("fit", str(ROOT / "README.md")), ("mechanics", str(DOCS / "finite-elements.md"))} <= named
+    assert [place for place in sorted(named) if place[0] not in tissuq.__all__] == []
+
+
 def test_the_guides_of_commands_are_pages_of_commands():
     known = {name.split()[0] for name in generated.commands()}
     assert set(generated.GUIDES) <= known

@@ -229,7 +229,8 @@ def _identifier(name: str) -> str:
 
     value = getattr(tissuq, name)
     if inspect.ismodule(value):
-        listed = "\n".join(f"        - {each}" for each in value.__all__)
+        elsewhere = public_names()
+        listed = "\n".join(f"        - {each}" for each in value.__all__ if each not in elsewhere)
         return f"::: tissuq.{name}\n    options:\n      members:\n{listed}\n"
     return f"::: tissuq.{name}\n"
 

@@ -2,6 +2,7 @@
 
 from tissuq import decks as decks
 from tissuq import finite_elements as finite_elements
+from tissuq import mechanics as mechanics
 from tissuq.assessment import Assessment as Assessment, Average as Average, average as average, compare as compare
 from tissuq.emulation import (
     Calibration as Calibration,
