@@ -174,12 +174,15 @@ def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others
         assert curves["force_complete"].shape == curves["energy_beyond"].shape == (9, 2)
         assert np.isfinite(curves["energy_beyond"].values[:, -1]).sum() == 4
     error = json.loads((here / "few" / "summary.json").read_text(encoding="utf-8"))["first_order_error"]["complete"]
-    assert 0 < error < 0.05
+    assert 0 < error["force"] < 0.05
+    assert 0 < error["sd"] < 0.5
     page = (here / "few" / "report.html").read_text(encoding="utf-8")
     assert "4 draws were computed in full" in page
     assert "4 of 9 draws computed in full, the others to first order" in page
     assert "For cells without size (Richardson" in page
-    assert f"The error of such a force is {100 * error:.2g} %" in page
+    force, mean, sd = (f"{100 * error[name]:.2g} %" for name in ("force", "mean", "sd"))
+    assert f"the error of such a force is {force} at the last step" in page
+    assert f"that of the mean of all draws {mean}, and that of their sd {sd}." in page
 
 
 @pytest.mark.finite_elements

@@ -80,7 +80,7 @@ def test_the_correction_is_exact_where_second_order_is_all_that_lacks():
     assert len(numbers) == 6
     forces, error = controlled(first_order, {number: full[number] for number in numbers})
     np.testing.assert_allclose(forces, full, rtol=1e-9)
-    assert (error < 1e-9).all()
+    assert max(of_steps.max() for of_steps in error) < 1e-9
 
 
 def test_draws_that_soften_lack_more_than_those_that_stiffen():
@@ -98,8 +98,8 @@ def test_the_error_that_is_told_is_that_of_the_others():
     forces, error = controlled(first_order, {number: full[number] for number in numbers})
     others = np.setdiff1d(np.arange(200), numbers)
     found = np.sqrt(((forces / full - 1)[others] ** 2).mean(axis=0))
-    assert (found < 1.6 * error).all()
-    assert (error < 2 * found).all()
+    assert (found < 1.6 * error.force).all()
+    assert (error.force < 2 * found).all()
     np.testing.assert_array_equal(forces[numbers], full[numbers])
 
 
@@ -112,17 +112,37 @@ def test_the_reference_for_which_first_order_is_exact_does_not_lower_the_error()
     chosen = {number: full[number] for number in numbers}
     _, without = controlled(first_order, chosen)
     _, error = controlled(exact, chosen | {len(full): np.ones(full.shape[1])})
-    assert error == pytest.approx(without, rel=1e-9)
+    assert error.force == pytest.approx(without.force, rel=1e-9)
 
 
-def test_the_draws_in_full_are_the_farthest_and_some_between():
+@pytest.mark.parametrize("count", [6, 8, 12])
+def test_the_errors_of_mean_and_sd_that_are_told_hold(count):
+    """Unevenness and factors as those of an indentation far beyond the measurements; most of the draws stiffen.
+
+    Where draws in full left a gap on one side, six of them gave an sd that was 9 % too large, and told 0.8 %.
+    """
+    generator = np.random.default_rng(2)
+    uneven = np.exp(np.linspace(np.log(0.001), np.log(0.9), 64))[:, None]
+    softens = (np.arange(64) % 9 == 4)[:, None] & (uneven < 0.1)
+    uneven[33] = 0.0  # the reference
+    lack = np.where(softens, -1.6 + 0.3 * np.log(10 * uneven + 1e-3), -1.02 + 0.14 * np.log(uneven + 1e-3)) * uneven
+    full = 8.0 + 1.0 * generator.normal(size=(64, 1)) + 3 * np.sqrt(uneven) * np.where(softens, -1, 1)
+    first_order = FirstOrder(full / (1 + lack), np.where(softens, 1 - uneven, 1 + uneven), uneven)
+    numbers = draws_in_full(first_order, count)
+    assert len(numbers) == count
+    assert 33 not in numbers  # of which nothing is to be learnt
+    forces, error = controlled(first_order, {number: full[number] for number in numbers})
+    mean, sd = (abs(of(forces) / of(full) - 1) for of in (np.mean, np.std))
+    assert sd < max(error.sd[0], 0.004) < 0.03
+    assert mean < max(error.mean[0], 0.003) < 0.01
+
+
+def test_the_draws_in_full_lie_where_least_is_known():
     stiffening = 1 + np.arange(20)[:, None] / 100
     found = FirstOrder(stiffening, stiffening, stiffening - 1)
-    numbers = draws_in_full(found, 6)
-    assert {17, 18, 19} <= set(numbers)
-    assert min(numbers) == 0
+    assert draws_in_full(found, 3) == [7, 12, 19]  # the farthest, 19 / e, and between the two
     both = FirstOrder(stiffening, 1 + np.where(np.arange(20) < 5, -1, 1)[:, None] * 0.1, stiffening - 1)
-    assert {4, 18, 19} <= set(draws_in_full(both, 6))
+    assert draws_in_full(both, 3) == [4, 7, 19]  # one on the other side before a third on this one
     assert draws_in_full(found, 99) == list(range(20))
 
 
@@ -131,7 +151,7 @@ def test_a_simulation_with_few_full_runs_has_the_band_of_one_with_all(posterior)
     case = replace(COARSE["indentation"], depth=0.15)
     every, some = (simulate(posterior, case, 16, steps=2, check_mesh=False, full_runs=full) for full in (None, 5))
     assert not every.first_order_error
-    error = some.first_order_error["complete"]
+    error = some.first_order_error["complete"].force
     wanted, found = (each.forces["complete"] for each in (every, some))
     assert (np.sqrt(((found / wanted - 1) ** 2).mean(axis=0)) <= 2 * error + 1e-4).all()
     assert found.std(axis=0) == pytest.approx(wanted.std(axis=0), rel=0.05)

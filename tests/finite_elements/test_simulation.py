@@ -9,6 +9,7 @@ import pytest
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements import ClampedBar, Indentation, bar_force, respond, simulate
+from tissuq.finite_elements.first_order import FirstOrderError
 from tissuq.finite_elements.library import felupe
 from tissuq.finite_elements.response import Solve, run_in_turn, solved
 from tissuq.finite_elements.warnings import simulation_warnings
@@ -125,6 +126,21 @@ def test_a_reader_is_warned_of_strains_beyond_the_measurements_and_of_few_draws(
         simulation_warnings(replace(found, forces=found.forces | {"alone": -found.forces["complete"]}))
     )
     assert "too coarse" in " ".join(simulation_warnings(replace(found, mesh_change=(-0.2, 1.0))))
+
+
+def test_a_reader_is_warned_of_an_sd_that_few_draws_in_full_leave_uncertain(found):
+    def said(full, sd):
+        """With 10 draws, of which so many are in full."""
+        forces = np.linspace(1.0, 1.2, 10)[:, None] * [0.5, 1.0]
+        beyond = np.where(np.arange(10)[:, None] < full, 0.0, np.nan) * np.ones(2)
+        error = FirstOrderError(np.zeros(2), np.zeros(2), np.array([0.5, sd]))
+        changed = replace(found, forces={"complete": forces}, volume_beyond=beyond, energy_beyond=beyond,
+                          first_order_error={"complete": error})  # fmt: skip
+        return " ".join(simulation_warnings(changed))
+
+    assert "With 9 of 10 draws computed in full, the sd of the force at 1 mm may be off by 7 %" in said(9, 0.07)
+    assert "in full" not in said(9, 0.03)
+    assert "by more than that, which so few do not tell: compute more in full (--full-runs 12)" in said(6, 0.01)
 
 
 def test_it_fails_when_no_draw_gets_anywhere(posterior):

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,14 @@ from tissuq.inference.threads import one_thread
 from tissuq.mechanics.rays import through
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
-__all__ = ["FirstOrder", "controlled", "draws_in_full", "first_order_forces"]
+__all__ = ["FirstOrder", "FirstOrderError", "controlled", "draws_in_full", "first_order_forces"]
 
 FloatArray = NDArray[np.float64]
 
 EXACT = 1e-12
 """Unevenness below which a draw is proportional to the reference."""
+FAR = 3.0
+"""How far a draw is, in logarithms of the unevenness, from those in full where none is on its side."""
 LEAST_RATIO, LEAST_POWER = 0.02, 1e-9
 """Smallest ratio of stresses over their mean, and smallest power of a point over the largest, that count."""
 
@@ -53,6 +56,22 @@ class FirstOrder:
     forces: FloatArray
     stiffening: FloatArray
     unevenness: FloatArray
+
+
+class FirstOrderError(NamedTuple):
+    """Relative errors of what is not computed in full: arrays (s,).
+
+    Attributes
+    ----------
+    force : (s,) array
+        Of the force of one draw that is not in full.
+    mean, sd : (s,) arrays
+        Of the mean and the standard deviation of all draws.
+    """
+
+    force: FloatArray
+    mean: FloatArray
+    sd: FloatArray
 
 
 def first_order_forces(
@@ -114,29 +133,33 @@ def _unevenness(powers: FloatArray, reference: int) -> FloatArray:
 
 
 def draws_in_full(first_order: FirstOrder, count: int) -> list[int]:
-    """Return the numbers of the draws that are to be computed in full.
+    """Return the numbers of the draws that are to be computed in full, each where least is known beside those before.
 
-    Half of them are those whose last unevenness is largest, where first order is least exact, of draws that stiffen and
-    of draws that soften in turn; the others are spread evenly over the order of all remaining ones.
+    That is the largest unevenness, times how far its logarithm is from that of the nearest draw in full on its side: of
+    draws that stiffen, or of draws that soften. The reference, for which nothing is lacking, comes last.
     """
-    order = np.argsort(-first_order.unevenness[:, -1])
-    if count >= len(order):
-        return sorted(order.tolist())
-    is_soft = first_order.stiffening[order, -1] < 1
-    in_turn = np.argsort(np.where(is_soft, np.cumsum(is_soft), np.cumsum(~is_soft)), kind="stable")
-    far = order[in_turn[: (count + 1) // 2]]
-    remaining = order[~np.isin(order, far)]
-    between = remaining[np.linspace(0, len(remaining) - 1, count - len(far)).round().astype(int)]
-    return sorted({*far.tolist(), *between.tolist()})
+    uneven, softens = first_order.unevenness[:, -1], first_order.stiffening[:, -1] < 1
+    logs, apart = np.log(np.maximum(uneven, EXACT)), np.full(len(uneven), FAR)
+    chosen: list[int] = []
+    for _ in range(min(count, len(uneven))):
+        unknown = uneven * apart
+        unknown[chosen] = -1.0
+        number = int(np.argmax(unknown))
+        chosen.append(number)
+        apart = np.where(softens == softens[number], np.minimum(apart, np.abs(logs - logs[number])), apart)
+    return sorted(chosen)
 
 
-def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> tuple[FloatArray, FloatArray]:
-    """Return the forces (N, s) of all draws, corrected by those in full, and the error (s,) of one that is not in full.
+def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> tuple[FloatArray, FirstOrderError]:
+    """Return the forces (N, s) of all draws, corrected by those in full, and their errors.
 
     What first order lacks is taken as c times the unevenness, relative to the force. Between the draws in full c is
-    interpolated over the logarithm of the unevenness, for draws that stiffen and for those that soften apart. The error
-    is that of c, from each draw in full left out, times the unevenness of the draws that are not in full, both as root
-    mean squares. Draws that are nearly proportional to the reference, for which nothing is lacking, say nothing of
+    interpolated over the logarithm of the unevenness, for draws that stiffen and for those that soften apart.
+
+    The errors are found from each draw in full left out: that of a force from the errors of c, between which it is
+    interpolated as c itself; those of mean and sd from how far these change, half the root of the sum of squares, as
+    without a draw c is interpolated over twice the distance, and from the errors of forces, as if these were
+    independent. Draws that are nearly proportional to the reference, for which nothing is lacking, say nothing of
     others.
 
     Parameters
@@ -146,26 +169,50 @@ def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> 
         Forces by the number of the draw; not a number where it did not get that far.
     """
     numbers = np.array(sorted(full))
-    wanted = np.array([full[number] for number in numbers], dtype=np.float64)
-    lack = wanted / first_order.forces[numbers] - 1
-    uneven, softens = first_order.unevenness, first_order.stiffening < 1
-    forces, errors = first_order.forces.copy(), np.zeros(len(lack.T))
-    for step, lack_then in enumerate(lack.T):
-        near, side = uneven[numbers, step], softens[numbers, step]
-        known = np.flatnonzero(np.isfinite(lack_then) & (near > EXACT))
-        factor = _factors(uneven[:, step], softens[:, step], near[known], lack_then[known], side[known])
-        forces[:, step] *= np.maximum(1 + factor * uneven[:, step], LEAST_RATIO)
-        apart = np.zeros(len(known))
-        for place, row in enumerate(known):
-            others = np.delete(known, place)
-            without = _factors(near[[row]], side[[row]], near[others], lack_then[others], side[others])
-            apart[place] = lack_then[row] / near[row] - without[0]
-        if len(known):
-            followed = np.delete(uneven[:, step], numbers) if len(numbers) < len(uneven) else near
-            of_factor = (apart[near[known] >= LEAST_RATIO * near[known].max()] ** 2).mean()
-            errors[step] = np.sqrt(of_factor * (followed**2).mean())
-    forces[numbers] = wanted
-    return forces, errors
+    wanted = np.full(first_order.forces.shape, np.nan)
+    wanted[numbers] = [full[number] for number in numbers]
+    steps = zip(first_order.forces.T, first_order.unevenness.T, first_order.stiffening.T < 1, wanted.T, strict=True)
+    columns = [_at_step(plain, uneven, softens, full_then, numbers) for plain, uneven, softens, full_then in steps]
+    forces, errors = zip(*columns, strict=True)
+    return np.stack(forces, axis=1), FirstOrderError(*np.transpose(errors))
+
+
+def _at_step(
+    plain: FloatArray, uneven: FloatArray, softens: NDArray[np.bool_], full: FloatArray, numbers: NDArray[np.intp]
+) -> tuple[FloatArray, tuple[float, float, float]]:
+    """Return the forces (N,) at a step, and the errors of one that is not in full, of their mean and of their sd."""
+
+    def factors(known: NDArray[np.intp]) -> FloatArray:
+        lack = full[known] / plain[known] - 1
+        return _factors(uneven, softens, uneven[known], lack, softens[known])
+
+    def corrected(factors: FloatArray) -> FloatArray:
+        return np.asarray(plain * np.maximum(1 + factors * uneven, LEAST_RATIO))
+
+    known = numbers[np.isfinite(full[numbers]) & (uneven[numbers] > EXACT)]
+    factor = factors(known)
+    forces = corrected(factor)
+    per_factor = plain * uneven / forces
+    forces[numbers] = full[numbers]
+    if not len(known):
+        return forces, (0.0, 0.0, 0.0)
+    is_there, is_followed = np.isfinite(forces), ~np.isin(np.arange(len(plain)), numbers)
+    mean, sd = forces[is_there].mean(), forces[is_there].std()
+    telling, changes = known[uneven[known] >= LEAST_RATIO * uneven[known].max()], []
+    for number in telling:
+        without = factors(known[known != number])
+        then = corrected(without)[is_there]
+        changes.append((abs(without[number] - factor[number]), then.mean() / mean - 1, then.std() / sd - 1))
+    of_factor, *of_band = np.transpose(changes)
+    apart = _factors(uneven, softens, uneven[telling], of_factor * uneven[telling], softens[telling]) * per_factor
+    of_force = np.sqrt((apart[is_followed if is_followed.any() else telling] ** 2).mean())
+    of_mean, of_sd = 0.5 * np.sqrt(np.square(of_band).sum(axis=1))
+    independent = of_force * np.sqrt(is_followed.sum()) / len(plain)
+    return forces, (
+        float(of_force),
+        float(np.hypot(of_mean, independent)),
+        float(np.hypot(of_sd, independent * abs(mean) / sd)),
+    )
 
 
 def _factors(

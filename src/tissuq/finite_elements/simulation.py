@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements.case import Case, Mesh
-from tissuq.finite_elements.first_order import controlled, draws_in_full, first_order_forces
+from tissuq.finite_elements.first_order import FirstOrderError, controlled, draws_in_full, first_order_forces
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.response import BULK_RATIO, Run, Solve, run_in_turn
 from tissuq.finite_elements.spread import force_table, mesh_factor, mesh_free
@@ -78,8 +78,9 @@ class Simulation:
         Computing time of all draws on one processor, s.
     mesh_changes : tuple of (float, float)
         The same at every travel at which there is one: the travel (mm), and the relative change of the force.
-    first_order_error : mapping of str to (s,) array
-        By family of which not all draws were computed in full: relative error of the force of one that was not.
+    first_order_error : mapping of str to FirstOrderError
+        By family of which not all draws were computed in full: relative errors of the force of one that was not, and of
+        the mean and the sd of all.
     mesh_ratio : float
         How many times smaller the cells of the finer mesh are.
     mesh_order : float
@@ -99,7 +100,7 @@ class Simulation:
     mesh_change: tuple[float, float] | None
     seconds: float
     mesh_changes: tuple[tuple[float, float], ...] = ()
-    first_order_error: Mapping[str, FloatArray] = field(default_factory=dict)
+    first_order_error: Mapping[str, FirstOrderError] = field(default_factory=dict)
     mesh_ratio: float = TWICE
     mesh_order: float = 1.0
 

@@ -16,13 +16,19 @@ MIN_ENERGY_SHARE = 0.05
 MIN_MESH_CHANGE = 0.03
 """Relative change of the force on a finer mesh from which a warning is given."""
 
+MAX_FIRST_ORDER_ERROR = 0.05
+"""Largest error of mean or sd, in sds, by draws that are not computed in full without a warning."""
+
+MIN_IN_FULL = 8
+"""Draws in full below which they do not tell the error that the others have: in tests it was up to three times that."""
+
 MAX_NEGATIVE_SHARE = -0.05
 """Share of the variance below which parameters and discrepancy are said to compensate each other."""
 
 
 def simulation_warnings(simulation: Simulation) -> list[str]:
     """Return all warnings about a simulation."""
-    checks = _failed, _extrapolated, _compensated, _too_few_draws, _coarse_mesh
+    checks = _failed, _extrapolated, _compensated, _too_few_draws, _few_in_full, _coarse_mesh
     return [sentence for check in checks for sentence in check(simulation)]
 
 
@@ -75,6 +81,24 @@ def _compensated(simulation: Simulation) -> list[str]:
 
 def _too_few_draws(simulation: Simulation) -> list[str]:
     return too_few_draws(int(np.isfinite(simulation.forces[COMPLETE]).sum(axis=0).max()))
+
+
+def _few_in_full(simulation: Simulation) -> list[str]:
+    if COMPLETE not in simulation.first_order_error:
+        return []
+    errors, forces = simulation.first_order_error[COMPLETE], simulation.forces[COMPLETE]
+    last = np.flatnonzero(np.isfinite(forces).sum(axis=0) > 1)[-1]
+    mean, sd = np.nanmean(forces[:, last]), np.nanstd(forces[:, last])
+    in_full = int(simulation.in_full.sum())
+    if in_full >= MIN_IN_FULL and max(errors.sd[last], errors.mean[last] * abs(mean) / sd) <= MAX_FIRST_ORDER_ERROR:
+        return []
+    at, more = simulation.case.shown(simulation.travel[last]), max(MIN_IN_FULL, 2 * in_full)
+    beyond = ", or by more than that, which so few do not tell" if in_full < MIN_IN_FULL else ""
+    return [
+        f"With {in_full} of {len(forces)} draws computed in full, the sd of the {simulation.case.response} at {at} may "
+        f"be off by {100 * errors.sd[last]:.2g} % and its mean by {100 * errors.mean[last]:.2g} %{beyond}: compute "
+        f"more in full (--full-runs {more})."
+    ]
 
 
 def _coarse_mesh(simulation: Simulation) -> list[str]:

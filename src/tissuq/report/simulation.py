@@ -185,7 +185,8 @@ def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
         "mesh_change": None if simulation.mesh_change is None else simulation.mesh_change[0],
         "noise_sd": simulation.noise_sd,
         "first_order_error": {
-            family: known_number(float(error[-1])) for family, error in simulation.first_order_error.items()
+            family: {name: known_number(float(of_steps[-1])) for name, of_steps in error._asdict().items()}
+            for family, error in simulation.first_order_error.items()
         },
         "admissible_share": simulation.ensembles[COMPLETE].admissible_share,
         "seconds": simulation.seconds,
@@ -340,13 +341,13 @@ def _first_order(simulation: Simulation) -> Iterator[str]:
     """Yield which draws were not computed in full, and the error of their forces."""
     if COMPLETE in simulation.first_order_error:
         in_full = int(simulation.in_full.sum())
-        error = simulation.first_order_error[COMPLETE][-1]
-        size = "not known" if np.isnan(error) else f"{100 * error:.2g} % at the last step"
+        force, mean, sd = (f"{100 * of_steps[-1]:.2g} %" for of_steps in simulation.first_order_error[COMPLETE])
         yield (
-            f"{in_full} draws were computed in full, of which half are those that stiffen most differently; the forces "
-            "of the others follow to first order from the deformation of the draw in the middle, corrected by those in "
-            f"full. The error of such a force is {size}. Fields, and what is strained beyond the measurements, are of "
-            "the draws in full alone."
+            f"{in_full} draws were computed in full, those whose forces say most of the others'; these follow to first "
+            "order from the deformation of the draw in the middle, corrected by those in full. Found from each of them "
+            f"left out, the error of such a force is {force} at the last step, that of the mean of all draws {mean}, "
+            f"and that of their sd {sd}. Fields, and what is strained beyond the measurements, are of the draws in "
+            "full alone."
         )
 
 

@@ -96,7 +96,7 @@ def _band(settings: StructureStudySettings, structure: str, posterior: Posterior
     return {
         **{name: float(getattr(band, name)[0]) for name in ("mean", "sd", "low", "high")},
         "completed": int(np.isfinite(forces).sum()),
-        "first_order_error": 0.0 if error is None or not np.isfinite(error[-1]) else float(error[-1]),
+        "first_order_error": 0.0 if error is None or not np.isfinite(error.force[-1]) else float(error.force[-1]),
     }
 
 
