@@ -255,6 +255,12 @@ def test_what_cannot_be_used_gets_one_message_and_leaves_nothing(cli, here, run,
     assert not (here / "out").exists()
 
 
+def test_a_bulk_modulus_of_no_incompressible_material_is_refused_before_anything_is_read(cli, here):
+    said = cli("structure", "no-run", "--bulk-ratio", 0.01)
+    assert said.status == 2
+    assert "(--bulk-ratio): a bulk modulus of 0.01 initial shear moduli gives a Poisson's ratio that is not" in said.err
+
+
 def test_a_discrepancy_that_is_no_energy_is_refused_before_anything_is_written(cli, here, specimen):
     assert (
         cli("fit", specimen, "--noise-sd", 1, "--discrepancy", "constant", "--no-figures", "--out", "run").status == 0

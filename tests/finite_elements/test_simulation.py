@@ -128,6 +128,20 @@ def test_a_reader_is_warned_of_strains_beyond_the_measurements_and_of_few_draws(
     assert "too coarse" in " ".join(simulation_warnings(replace(found, mesh_change=(-0.2, 1.0))))
 
 
+@pytest.mark.parametrize("ratio", [0.01, 2 / 3, np.nan])
+def test_a_bulk_modulus_of_no_incompressible_material_is_refused(posterior, ratio):
+    with pytest.raises(InputError, match=r"Poisson's ratio that is not positive.*give 20 or more.*--bulk-ratio"):
+        simulate(posterior, BAR, 4, steps=1, bulk_ratio=ratio)
+    with pytest.raises(InputError, match="incompressible"):
+        respond(BAR, material_named("neo-hookean"), [5e-4], steps=1, bulk_ratio=ratio)
+
+
+def test_a_reader_is_warned_of_a_volume_that_changes(found):
+    soft, hard = (" ".join(simulation_warnings(replace(found, bulk_ratio=ratio))) for ratio in (3.0, 20.0))
+    assert "The bulk modulus is 3 times the initial shear modulus: the volume changes" in soft
+    assert "the volume changes" not in hard
+
+
 def test_a_reader_is_warned_of_an_sd_that_few_draws_in_full_leave_uncertain(found):
     def said(full, sd):
         """With 10 draws, of which so many are in full."""

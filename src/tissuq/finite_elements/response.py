@@ -108,7 +108,8 @@ def respond(
     Raises
     ------
     InputError, ModelError
-        When FElupe is not installed, the material is none for finite elements, or the travels do not increase.
+        When FElupe is not installed, the material is none for finite elements, the travels do not increase, or the
+        bulk modulus is too small for a nearly incompressible material.
 
     References
     ----------

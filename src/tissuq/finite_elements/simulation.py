@@ -14,6 +14,7 @@ from tissuq.finite_elements.case import Case, Mesh
 from tissuq.finite_elements.first_order import FirstOrderError, controlled, draws_in_full, first_order_forces
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.response import BULK_RATIO, Run, Solve, run_in_turn
+from tissuq.finite_elements.solver import check_bulk_ratio
 from tissuq.finite_elements.spread import force_table, mesh_factor, mesh_free
 from tissuq.posterior.draws_in_words import FailedDraw
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
@@ -85,6 +86,8 @@ class Simulation:
         How many times smaller the cells of the finer mesh are.
     mesh_order : float
         Power of their size with which the error falls.
+    bulk_ratio : float
+        Bulk modulus in initial shear moduli.
     """
 
     case: Case
@@ -103,6 +106,7 @@ class Simulation:
     first_order_error: Mapping[str, FirstOrderError] = field(default_factory=dict)
     mesh_ratio: float = TWICE
     mesh_order: float = 1.0
+    bulk_ratio: float = BULK_RATIO
 
     @property
     def in_full(self) -> NDArray[np.bool_]:
@@ -199,7 +203,8 @@ def simulate(
     Raises
     ------
     InputError, ModelError
-        When FElupe is not installed, or the posterior has no materials for finite elements.
+        When FElupe is not installed, the posterior has no materials for finite elements, or the bulk modulus is too
+        small for nearly incompressible ones.
     ConvergenceError
         When fewer than two draws reached the first step.
 
@@ -216,6 +221,7 @@ def simulate(
     """
     if draws < MIN_DRAWS or steps < 1:
         raise InputError(f"a simulation has {MIN_DRAWS} draws or more and one step or more, not {draws} and {steps}.")
+    check_bulk_ratio(bulk_ratio)
     ensembles = {COMPLETE: posterior.ensemble(draws, seed)}
     if shares and any(draw.discrepancy is not None or len(draw.parts) > 1 for draw in ensembles[COMPLETE]):
         ensembles[MATERIAL_ONLY] = ensembles[COMPLETE].alone
@@ -267,6 +273,7 @@ def simulate(
         first_order_error=errors,
         mesh_ratio=mesh_ratio,
         mesh_order=case.mesh_order if mesh_order is None else mesh_order,
+        bulk_ratio=bulk_ratio,
     )
 
 

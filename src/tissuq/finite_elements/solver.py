@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.errors import ModelError
+from tissuq.errors import InputError, ModelError
+from tissuq.export.cards import NEARLY
 from tissuq.finite_elements.case import AXIAL, Case
 from tissuq.finite_elements.library import felupe, field_on, region_of
 from tissuq.finite_elements.loads import Action, load_on
 from tissuq.finite_elements.material import FElupeMaterial, distortional_energy
 from tissuq.mechanics import Material
 
-__all__ = ["CellFields", "Solver", "StrainPath"]
+__all__ = ["CellFields", "Solver", "StrainPath", "check_bulk_ratio"]
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, FloatArray, FloatArray]
@@ -32,6 +33,22 @@ STEP_FRACTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
 """Fractions of a Newton step; the largest that keeps the residual within its limit is taken."""
 MAX_RESIDUAL_GROWTH = 1.5
 """Largest factor by which the residual may grow in a step: on the way to a solution it need not always fall."""
+
+
+def check_bulk_ratio(ratio: float) -> None:
+    """Refuse a bulk modulus, in initial shear moduli, that would make Poisson's ratio negative: as cards do.
+
+    Raises
+    ------
+    InputError
+        When it is so small, or no finite number.
+    """
+    if not 2 < 3 * ratio < np.inf:
+        raise InputError(
+            f"a bulk modulus of {ratio:g} initial shear moduli gives a Poisson's ratio that is not positive, and the "
+            f"measurements are taken as those of an incompressible material: give {NEARLY:g} or more, or none "
+            "(--bulk-ratio)."
+        )
 
 
 @dataclass(frozen=True)
@@ -89,6 +106,7 @@ class Solver:
     """
 
     def __init__(self, case: Case, material: Material, values: ArrayLike | None, bulk_ratio: float) -> None:
+        check_bulk_ratio(bulk_ratio)
         fem, mesh = felupe(), case.mesh()
         supports = case.supports(mesh.points)
         self._bulk_ratio = bulk_ratio

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tissuq.export.cards import NEARLY
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, Simulation
 from tissuq.finite_elements.spread import shares_of, too_few_draws
 from tissuq.posterior.draws_in_words import failed_draws
@@ -28,7 +29,7 @@ MAX_NEGATIVE_SHARE = -0.05
 
 def simulation_warnings(simulation: Simulation) -> list[str]:
     """Return all warnings about a simulation."""
-    checks = _failed, _extrapolated, _compensated, _too_few_draws, _few_in_full, _coarse_mesh
+    checks = _failed, _softer_in_volume, _extrapolated, _compensated, _too_few_draws, _few_in_full, _coarse_mesh
     return [sentence for check in checks for sentence in check(simulation)]
 
 
@@ -41,6 +42,15 @@ def _failed(simulation: Simulation) -> list[str]:
         f"at {{:.3g}} {simulation.case.travel_unit}",
         "failures.csv has all of them.",
     )
+
+
+def _softer_in_volume(simulation: Simulation) -> list[str]:
+    if simulation.bulk_ratio >= NEARLY:
+        return []
+    return [
+        f"The bulk modulus is {simulation.bulk_ratio:.3g} times the initial shear modulus: the volume changes, while "
+        "the measurements were understood as those of an incompressible material."
+    ]
 
 
 def _extrapolated(simulation: Simulation) -> list[str]:

@@ -8,12 +8,13 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from tissuq.errors import InputError
 from tissuq.registry import find
 from tissuq.studies.option import option
 from tissuq.studies.option_texts import number_or_text, pairs_of
+from tissuq.studies.settings import looked_up
 from tissuq.studies.shared_options import RunSettings, mesh_order, seed
 
 if TYPE_CHECKING:
@@ -118,6 +119,14 @@ class SimulationSettings(RunSettings):
         if values.get("mesh") is None:
             return {**values, "case": values.get("case") or USUAL_CASE}
         return {**values, "case": None if values.get("case") == USUAL_CASE else values.get("case")}
+
+    @field_validator("bulk_ratio")
+    @classmethod
+    def _nearly_incompressible(cls, ratio: float) -> float:
+        from tissuq.finite_elements.solver import check_bulk_ratio
+
+        looked_up(check_bulk_ratio, ratio)
+        return ratio
 
     def sized_case(self, beside: Path = Path()) -> Case:
         """Return the case with its sizes, or the body of a mesh that lies beside a recipe.
