@@ -70,7 +70,7 @@ def test_a_run_leaves_the_promised_files(population_run):
     }
     assert found == inputs | figures | tables | {"report.html", "result.json", "run.toml", "contents.txt", "tissuq.log"}
     assert "A population of 6 specimens" in said.out
-    assert "does not describe the range of patients" in " ".join(said.out.split())
+    assert "does not describe the range of specimens" in " ".join(said.out.split())
     page = (folder / "run" / "report.html").read_text()
     assert all(f"<td>S{k}</td>" in page for k in range(6))
     assert "kPa" in page
@@ -85,7 +85,7 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
     contents = json.loads(run_in(folder, "show", "run", "--json").out)
     patient = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
     headline = contents["result"]["numbers"][0]
-    assert headline["name"] == "initial shear modulus of a new patient"
+    assert headline["name"] == "initial shear modulus of a new specimen"
     for name, end in (("value", "median"), ("low", "hdi_low"), ("high", "hdi_high")):
         assert headline[name] == pytest.approx(2 * float(patient[end]), rel=1e-6)  # the modulus is twice C10
     assert headline["unit"] == "kPa"
@@ -112,7 +112,7 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     words = ["ensemble", folder / "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", *options]
     said = run_in(tmp_path, *words, "--solver", "ccx", "--out", "forces")
     assert said.status == 0, said.err
-    assert "those of a new patient of the population of 6 specimens" in " ".join(said.out.split())
+    assert "those of a new specimen of the population of 6 specimens" in " ".join(said.out.split())
     forces = np.array([float(row["force"]) for row in table(tmp_path / "forces" / "draws.csv")])
     row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
     assert np.median(forces) == pytest.approx(float(row["median"]), rel=0.05)
@@ -124,7 +124,7 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     with xr.open_dataset(tmp_path / "bar" / "curves.nc") as curves:
         ratio = curves["force_complete"].values[:, -1] / curves["parameter_C10"].values
     assert ratio == pytest.approx(ratio[0], rel=1e-6)
-    assert "those of a new patient of the population" in (tmp_path / "bar" / "report.html").read_text()
+    assert "those of a new specimen of the population" in (tmp_path / "bar" / "report.html").read_text()
     again = ["structure", "--config", "bar/run.toml", "--workers", 1, "--no-figures", "--out", "again"]
     assert run_in(tmp_path, *again).status == 0
     assert (tmp_path / "again" / "forces.csv").read_bytes() == (tmp_path / "bar" / "forces.csv").read_bytes()
@@ -216,6 +216,14 @@ def test_warnings_about_files_are_told_with_their_specimens(here):
     assert any(text.startswith(UNITS_ASSUMED) for text in population._data_warnings(readings))
 
 
+def test_specimens_are_left_out_by_name(here):
+    write_all(here)
+    settings = PopulationSettings(files=("specimens",), without=("S1", "S5"))
+    assert list(settings.readings()) == ["S0", "S2", "S3", "S4"]
+    with pytest.raises(tq.InputError, match=r"--without S9: there is no such specimen; the specimens are S0, S1"):
+        PopulationSettings(files=("specimens",), without=("S9",)).readings()
+
+
 @pytest.mark.slow
 def test_specimens_may_be_tested_in_several_modes(cli, here):
     """Files say their mode by a comment or by their name; a run folder keeps both."""
@@ -274,14 +282,14 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     assert float(row["hdi_low"]) < np.exp(slope) < float(row["hdi_high"])
     assert float(row["positive"]) > 0.9
     text = " ".join(said.out.split())
-    assert "new patient (age 80 year)" in text
+    assert "new specimen (age 80 year)" in text
     assert "beyond the specimens: age 80 year (theirs: 30 to 70)" in text
     assert f"{float(row['median']):.4g} per year" in text
     needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
     assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
     assert needed["new patient"]["specimens"] == ""
     assert "Specimens like these for ± 8%" in text
-    assert "not reached: patients differ more" in text
+    assert "not reached: specimens differ more" in text
     patient = next(row for row in table(here / "run" / "population.csv") if row["quantity"] == "new patient")
     assert float(patient["median"]) == pytest.approx(
         np.exp(np.polyval(np.polyfit(AGES, np.log(MODULI_KPA), 1), 80)), 0.1
@@ -362,6 +370,7 @@ def test_covariates_that_cannot_be_used_end_with_one_message(cli, here, rows, op
         (["specimens", "--estimand", "tissue"], "which a population finds itself"),
         (["specimens", "--tolerance", "stress=much"], "is not a tolerance"),
         (["specimens", "--parameter", "C99"], "found: C99"),
+        (["specimens", "--without", "S9"], "--without S9: there is no such specimen"),
         (["specimens", "--spread", "-1"], "spread"),
         (["specimens", "--noise-sd", "much"], "--noise-sd must be a number"),
         (["specimens", "--noise-sd", "1,2"], "--noise-sd must be a number"),

@@ -81,8 +81,8 @@ def test_their_cards_give_the_stress_of_their_law(found, tmp_path):
 
         wanted = [reference(energy, row["bulk_modulus"], load) for load in loads]
         assert calculix(text, loads, tmp_path) == pytest.approx(wanted, rel=1e-5)
-        assert "a new patient of the population of 6 specimens" in " ".join(text.replace("**", "").split())
-    assert cards.warnings[0].startswith("The draws are those of a new patient of the population of 6 specimens")
+        assert "a new specimen of the population of 6 specimens" in " ".join(text.replace("**", "").split())
+    assert cards.warnings[0].startswith("The draws are those of a new specimen of the population of 6 specimens")
 
 
 @pytest.mark.slow

@@ -3,6 +3,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.drawing.panels import panels
+from tissuq.population.picture import draw_specimens
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +47,33 @@ def test_a_new_patient_is_drawn_as_predicted_for_measurements_that_were_not_fitt
     axis = population.patient.plot()
     assert axis.get_title(loc="left") == "predicted, not fitted to these"
     plt.close(axis.figure)
+
+
+def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
+    import pandas as pd
+
+    ends = ["median", "hdi_low", "hdi_high"]
+    rows = {
+        "median": [0.5, 0.4, 0.6],
+        "spread": [1, 0.5, 2],
+        "new patient": [0.5, 0.1, 9],
+        "complete pooling": [0.5, 0.499, 0.501],
+    }
+    summary = pd.DataFrame.from_dict({("C10", name): row for name, row in rows.items()}, "index", columns=ends)
+    summary.index = pd.MultiIndex.from_tuples(summary.index)
+    medians = {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.45, "stiff": 30.0}
+    specimens = pd.DataFrame.from_dict(
+        {(name, "C10"): [m, 0.9 * m, 1.1 * m] * 2 for name, m in medians.items()},
+        "index", columns=[*ends, *(f"alone_{end}" for end in ends)],
+    )  # fmt: skip
+    specimens.index = pd.MultiIndex.from_tuples(specimens.index)
+    with panels(plt.subplots()[1], 1) as drawn:
+        draw_specimens(drawn, summary, specimens, {"C10": "MPa"})
+    (axis,) = drawn.axes
+    low, high = axis.get_xlim()
+    assert 0.1 < low < 0.36
+    assert 0.66 < high < 1
+    assert {text.get_text() for text in axis.texts} == {"30 [27, 33]", "a new specimen: from 0.1 to 9"}
+    complete = [line for line in axis.lines if line.get_marker() == "D"]
+    assert [line.get_xdata().item() for line in complete] == [0.5]  # seen however narrow its interval
+    plt.close("all")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ from scipy.special import logsumexp
 from scipy.stats import norm, truncnorm
 
 import tissuq as tq
+from tissuq.population.warnings import _far_specimens, far_specimens
+from tissuq.report.population import _next_step
+from tissuq.result_warning import Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
 MODULI = [0.15, 0.4, 0.5, 0.6, 0.9, 0.3]
@@ -419,3 +423,23 @@ def test_tables_stand_for_the_tests_of_specimens():
     }
     pairs = zip(neo_hookean(tables).median.ravel(), neo_hookean(specimens_of(MODULI)).median.ravel(), strict=True)
     assert all(abs(of_table / of_experiment - 1) < 1e-6 for of_table, of_experiment in pairs)
+
+
+def test_specimens_that_were_hardly_deformed_are_refused_by_name():
+    specimens = {name: tq.simulate("neo-hookean", {"C10": 0.4}, [1.1, 1.2, 1.3], 0.01, seed=0) for name in "abcd"}
+    specimens["still"] = tq.simulate("neo-hookean", {"C10": 0.4}, [0.999996, 0.999998], 0.01, seed=0)
+    with pytest.raises(tq.InputError, match=r"still \(by 4e-06 at the most\).*--without still"):
+        tq.fit_population(specimens)
+
+
+def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
+    moduli = {"a": 1.0, "b": 1.2, "c": 0.9, "soft": 0.005}
+    fits = {name: SimpleNamespace(initial_shear_modulus=SimpleNamespace(mean=value)) for name, value in moduli.items()}
+    population = SimpleNamespace(posteriors=fits, converged=True)
+    assert list(far_specimens(population)) == ["soft"]
+    (warning,) = _far_specimens(population)
+    assert warning.severity == Severity.PROBLEM
+    assert "the modulus of soft is 0.0053 times that of the other specimens" in warning
+    assert _next_step(population).startswith("look at soft first")
+    population.posteriors.pop("soft")
+    assert "finite elements" in _next_step(population)

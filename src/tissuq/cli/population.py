@@ -22,7 +22,7 @@ class PopulationOptions(Written):
 
 @command(PopulationSettings, PopulationOptions)
 def population(call: Call[PopulationSettings, PopulationOptions]) -> None:
-    """Identify a population from its specimens, every specimen within it, and what to expect for a new patient."""
+    """Identify a population from its specimens, every specimen within it, and what to expect of a new specimen."""
     from tissuq.mechanics import material_named
     from tissuq.report.population import population_result
     from tissuq.studies.population import run_population

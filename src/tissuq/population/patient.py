@@ -1,4 +1,4 @@
-"""Stress of a new patient: a material from the population, and the model error of a specimen that was measured."""
+"""Stress of a new specimen: a material from the population, and the model error of a specimen that was measured."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def patient_posterior(
     solution = Solution(
         model,
         "population",
-        f"a new patient of the population of {names}; what is not pooled is that of a random specimen{left_out}",
+        f"a new specimen of the population of {names}; what is not pooled is that of a random specimen{left_out}",
         lambda: mixture,
         Marginals.of(model, lambda symbol: marginal_of_points(columns[symbol], weights, support[symbol])),
         sampled=linear.reshape(chains, draws, -1),
@@ -125,7 +125,7 @@ def patient_band(
     prob: float,
     **options: Any,
 ) -> FloatArray:
-    """Return low, median and high (3, g) of the stress of a new patient, whose model error is a random specimen's.
+    """Return low, median and high (3, g) of the stress of a new specimen, whose model error is a random specimen's.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def patient_band(
     if len(loading.controls) > 1:
         names = ", ".join(control.name for control in loading.controls)
         raise InputError(
-            f"the stress of a new patient is predicted in loading modes with one control, and '{loading.name}' has "
+            f"the stress of a new specimen is predicted in loading modes with one control, and '{loading.name}' has "
             f"{names}."
         )
     chains, draws, count, size = hierarchy.specimens.shape
@@ -179,7 +179,7 @@ def patient_curves(
     channel: int,
     discrepancy: bool,
 ) -> FloatArray:
-    """Return stresses (N, g) of new patients whose model error is that of one specimen.
+    """Return stresses (N, g) of new specimens whose model error is that of one specimen.
 
     They are nan where the specimen was not measured; and in other modes than its own if its error is not an energy.
 

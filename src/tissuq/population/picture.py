@@ -1,4 +1,4 @@
-"""The picture of a population: every specimen by itself and within the population, and where a new patient may be."""
+"""The picture of a population: every specimen by itself and within the population, and where a new one may be."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.drawing.panels import Panels
+from tissuq.drawing.panels import Panels, limits_of
 from tissuq.drawing.pieces import forest
 from tissuq.drawing.style import BAND, BASE, INK, TRUTH, relative_size
 
@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 ALONE = "#b8b8b8"
 ENDS = ("hdi_low", "hdi_high")
 COLUMNS = [f"{prefix}{name}" for prefix in ("", "alone_") for name in ("median", *ENDS)]
+FENCE = 3.0
+"""Quartile ranges beyond the quartiles of the medians from which a specimen need not be within the axis."""
 SMALL_MARKS_ABOVE = 25
 """Number of specimens above which names and marks are smaller."""
 
@@ -43,11 +45,13 @@ def draw_specimens(
         new, median, complete = (
             [quantities[symbol, name][end] for end in ENDS] for name in ("new patient", "median", "complete pooling")
         )
-        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new patient, 95 %")
-        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population")
-        panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label="complete pooling")
+        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new specimen, 95 %")
+        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population, 95 %")
+        forest(panel, -0.55, complete[0], np.mean(complete), complete[1], color=TRUTH, width=4, mark="D", size=4,
+               label="complete pooling (all as one specimen)")  # fmt: skip
         _draw_specimens(panel, estimates, small)
-        panel.set_xlim(*_limits([*new, *estimates["hdi_low"], *estimates["hdi_high"]], estimates))
+        panel.set_xlim(*_limits(estimates, [*new, *median, *complete]))
+        _say_what_is_outside(panel, estimates, new)
         panel.locator_params(axis="x", nbins=6)
         panel.set_xlabel(f"{symbol} [{unit}]" if unit else symbol)
         labels = order if number % drawn.columns == 0 else [""] * len(order)
@@ -67,12 +71,29 @@ def numbers_of(table: pd.DataFrame) -> dict[Any, dict[str, float]]:
     return {index: {str(name): float(value) for name, value in row.items()} for index, row in table.T.to_dict().items()}
 
 
-def _limits(shown: list[float], estimates: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the ends of an axis on which new patients and specimens within the population fit; others may run out."""
-    low, high = min(shown), max(shown)
-    width = high - low
-    ends = float(estimates["alone_hdi_low"].min()), float(estimates["alone_hdi_high"].max())
-    return max(min(low, ends[0]), low - width) - 0.04 * width, min(max(high, ends[1]), high + width) + 0.04 * width
+def _limits(estimates: Mapping[str, FloatArray], others: list[float]) -> tuple[float, float]:
+    """Return the ends of an axis for the specimens that are not far from the rest; others may run out."""
+    first, last = np.quantile(estimates["median"], [0.25, 0.75])
+    reach = FENCE * (last - first)
+    near = (estimates["median"] >= first - reach) & (estimates["median"] <= last + reach)
+    ends = [estimates[f"{prefix}{end}"][near] for prefix in ("", "alone_") for end in ENDS]
+    return limits_of([estimates["median"][near]], [*ends, others], margin=1.0)
+
+
+def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float]) -> None:
+    """Mark specimens whose median lies beyond the axis, and say where; and how far the range of new ones goes on."""
+    low, high = axis.get_xlim()
+    looks: dict[str, Any] = {"transform": axis.get_yaxis_transform(), "color": INK}
+    words: dict[str, Any] = looks | {"fontsize": "small", "va": "center"}
+    for level, (median, start, end) in enumerate(zip(*(estimates[name] for name in ("median", *ENDS)), strict=True)):
+        if not low <= median <= high:
+            mark, side, place, inward = (">", "right", 0.985, -0.025) if median > high else ("<", "left", 0.015, 0.025)
+            axis.plot([place], [level], mark, ms=4 * relative_size(), **looks)
+            axis.text(place + inward, level, f"{median:.2g} [{start:.2g}, {end:.2g}]", ha=side, **words)
+    beyond = [f"{word} {end:.2g}" for word, end, is_beyond in zip(
+        ("from", "to"), new, (new[0] < low, new[1] > high), strict=True) if is_beyond]  # fmt: skip
+    if beyond:
+        axis.text(0.985, -0.55, f"a new specimen: {' '.join(beyond)}", ha="right", **words)
 
 
 def _draw_specimens(axis: Axes, estimates: Mapping[str, FloatArray], small: bool) -> None:

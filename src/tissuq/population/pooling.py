@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ from tissuq.posterior.solver import Method
 __all__ = ["MIN_SPECIMENS", "fit_population"]
 
 MIN_SPECIMENS = 3
+LEAST_DEFORMATION = 0.01
+"""Of a specimen, over that of the others, below which it was hardly deformed."""
 """Smallest number of specimens: two determine a difference, but no spread."""
 ALL_SPECIMENS = "all specimens"
 """Name of all specimens together, as complete pooling treats them."""
@@ -91,8 +94,9 @@ def fit_population(
     Raises
     ------
     InputError
-        When there are fewer than three specimens, a test is no experiment, there is no such parameter, or covariates
-        cannot be used: missing, constant, determined by others, or too many; or there is no discrepancy to share.
+        When there are fewer than three specimens, one was hardly deformed, a test is no experiment, there is no such
+        parameter, or covariates cannot be used: missing, constant, determined by others, or too many; or there is no
+        discrepancy to share.
     ModelError, ConvergenceError
         When a specimen cannot be fitted.
 
@@ -128,6 +132,7 @@ def fit_population(
             "a shared discrepancy needs specimens that are fitted with one: choose a discrepancy such as 'auto', or "
             "leave out that it is shared."
         )
+    _check_deformed(specimens)
     known = covariates_of(covariates, list(specimens))
     of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
     of_tests = of_tests if isinstance(of_tests, Tolerances) else Tolerances(**of_tests)
@@ -183,6 +188,24 @@ def _by_specimen(
             "experiments. For a single specimen use tissuq.fit."
         )
     return tests_of
+
+
+def _check_deformed(specimens: Mapping[str, Sequence[Experiment]]) -> None:
+    """Refuse specimens whose tests went next to nowhere: they say nothing of a stiffness, and would look very stiff."""
+    largest = {
+        name: max(float(np.abs(test.stretch - test.mode.reference).max()) for test in tests)
+        for name, tests in specimens.items()
+    }
+    usual = median(largest.values())
+    small = [name for name, deformation in largest.items() if deformation < LEAST_DEFORMATION * usual]
+    if small:
+        which = ", ".join(f"{name} (by {largest[name]:.2g} at the most)" for name in small)
+        options = " ".join(f"--without {name}" for name in small)
+        raise InputError(
+            f"hardly deformed: {which}, while half of the specimens were by {usual:.2g} or more. Such tests say "
+            "nothing of a stiffness, and would widen the range of all specimens. See whether the column and the unit "
+            f"of the stretch are right; or leave out what was not stretched: {options}."
+        )
 
 
 def _noise_of_specimens(noise_sd: Any, specimens: Mapping[str, Sequence[Experiment]]) -> dict[str, Any]:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from statistics import median
 
 from tissuq.population.draws import PopulationDraws
+from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["MIN_EFFECTIVE_SHARE", "warnings_of"]
+__all__ = ["MIN_EFFECTIVE_SHARE", "far_specimens", "warnings_of"]
 
 MIN_EFFECTIVE_SHARE = 0.5
 """Smallest share of draws that must remain effective when they are corrected."""
@@ -37,11 +38,11 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
         beside = f" beside {columns} effects of covariates" * bool(columns)
         sentences.append(
             f"{len(population.names)} specimens determine the spread poorly{beside}: its prior, half-normal with sd "
-            f"{population.spread_prior:g} of the logarithm, influences the interval of a new patient, too."
+            f"{population.spread_prior:g} of the logarithm, influences the interval of a new specimen, too."
         )
     if beyond := population.covariates.beyond(population.patient_covariates):
         sentences.append(
-            f"the new patient is beyond the specimens: {', '.join(beyond)}. That effects go on so is assumed."
+            f"the new specimen is beyond the specimens: {', '.join(beyond)}. That effects go on so is assumed."
         )
     return tuple(sentences)
 
@@ -61,13 +62,23 @@ def _equal_specimens(population: PopulationDraws) -> Iterator[str]:
         )
 
 
-def _far_specimens(population: PopulationDraws) -> Iterator[str]:
-    """Yield a warning about specimens whose stiffness is that of others in another unit."""
+def far_specimens(population: PopulationDraws) -> dict[str, float]:
+    """Return the specimens whose stiffness may be that of others in another unit, with their modulus over the usual."""
     moduli = {name: posterior.initial_shear_modulus.mean for name, posterior in population.posteriors.items()}
     middle = median([modulus for modulus in moduli.values() if modulus > 0] or [0.0])
-    for name, modulus in moduli.items():
-        if modulus > 0 and not 1 / FAR_FACTOR < modulus / middle < FAR_FACTOR:
-            yield (
-                f"the modulus of {name} is {modulus / middle:.2g} times that of the other specimens: see whether the "
-                "unit of its stresses, or its area, is right."
-            )
+    return {
+        name: modulus / middle
+        for name, modulus in moduli.items()
+        if modulus > 0 and not 1 / FAR_FACTOR < modulus / middle < FAR_FACTOR
+    }
+
+
+def _far_specimens(population: PopulationDraws) -> Iterator[str]:
+    """Yield a problem about each specimen that is far from the others."""
+    for name, times in far_specimens(population).items():
+        yield ResultWarning(
+            f"the modulus of {name} is {times:.2g} times that of the other specimens, and widens the range of new "
+            "ones: see whether the unit of its stresses, or its area, is right; if it is no such specimen, leave it "
+            f"out (--without {name}).",
+            severity=Severity.PROBLEM,
+        )

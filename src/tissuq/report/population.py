@@ -1,23 +1,20 @@
-"""The result of a population: what to expect of a new patient, tables, draws, figures and the converted data."""
+"""The result of a population: what to expect of a new specimen, tables, draws, figures and the converted data."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.assessment.modulus import modulus_symbols
-from tissuq.drawing import pieces
-from tissuq.drawing.panels import on_figure
-from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
-from tissuq.population.picture import height_of, numbers_of
+from tissuq.population.picture import numbers_of
+from tissuq.population.warnings import far_specimens
+from tissuq.report.population_figures import Bands, first_parameter_figure, patient_figure, specimens_figure
 from tissuq.report.population_tables import (
     copy_of_covariates,
     effects_of_covariates,
@@ -33,83 +30,19 @@ from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from tissuq.population import Population
 
-__all__ = [
-    "HEADERS",
-    "Bands",
-    "patient_figure",
-    "population_result",
-    "readable_population",
-    "specimens_figure",
-]
-
-FloatArray = NDArray[np.float64]
-Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
-"""Stress of a new patient with the model error, and of the material alone."""
-
-
-def specimens_figure(population: Population, unit: StressUnit) -> Figure:
-    """Return `Population.plot` as a figure of the report, its panels side by side."""
-    count = len(population.symbols)
-    with new_figure(
-        6.4 if count == 1 else min(3.6 * count + 0.6, 12.0), height_of(len(population.names)) + 0.7
-    ) as figure:
-        population.draw(on_figure(figure, count, count), unit)
-    return figure
-
-
-def patient_figure(population: Population, bands: Mapping[LoadingMode, Bands], unit: StressUnit) -> Figure:
-    """Return the stress of a new patient, with and without the model error, over the curves of the specimens.
-
-    Parameters
-    ----------
-    population : Population
-    bands : mapping of LoadingMode to two pandas.DataFrame
-        From `Population.new_patient`, with the discrepancy and without; a panel each.
-    unit : StressUnit
-    """
-    with new_figure(6.6 if len(bands) == 1 else min(4.6 * len(bands), 13.8), 4.2) as figure:
-        panels = figure.subplots(1, len(bands), squeeze=False)[0]
-        for axis, (mode, mode_bands) in zip(panels, bands.items(), strict=True):
-            _draw_patient(axis, population, mode, mode_bands, unit)
-        panels[0].set_ylabel(f"engineering stress [{unit.name}]")
-        panels[0].legend(fontsize=9)
-        if len(bands) == 1:
-            panels[0].set_title(f"Expected for a new patient: {next(iter(bands)).name}")
-        else:
-            figure.suptitle("Expected for a new patient")
-    return figure
-
-
-def _draw_patient(axis: Axes, population: Population, mode: LoadingMode, bands: Bands, unit: StressUnit) -> None:
-    tests = [test for posterior in population.posteriors.values() for test in posterior.model.experiment.tests]
-    for index, data in enumerate(test for test in tests if test.mode == mode):
-        order = np.argsort(data.stretch, kind="stable")
-        axis.plot(data.stretch[order], data.stress[order] / unit.to_mpa, color=BASE, lw=0.7, alpha=0.7,
-                  label="" if index else "measured specimens")  # fmt: skip
-    band, material_alone = bands
-    low, high = band["low"] / unit.to_mpa, band["high"] / unit.to_mpa
-    pieces.band(axis, band["stretch"], low, high, label="a new patient, 95 %")
-    pieces.line(axis, band["stretch"], band["median"] / unit.to_mpa, width=1.8, label="median")
-    for end in ("low", "high"):
-        axis.plot(material_alone["stretch"], material_alone[end] / unit.to_mpa, ":", color=TRUTH, lw=1.4,
-                  label="" if end == "high" else "95 % of the material alone")  # fmt: skip
-    axis.set_xlabel(mode.controls[0].name)
-    axis.set_title(mode.name)
-
+__all__ = ["HEADERS", "population_result", "readable_population"]
 
 PATIENT = "new-patient"
-"""Name of the file with the posterior of a new patient, from which other commands start."""
+"""Name of the file with the posterior of a new specimen, from which other commands start."""
 ENDS = ("hdi_low", "hdi_high")
-NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of patients."
+NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of specimens."
 SPECIMENS = (
     "Every specimen by itself (grey) and within the population (blue): 95 % HPD and median. Bands: 95 % for a new "
-    "patient, and for the median of the population. At the bottom, complete pooling. Grey bars may run out of the "
-    "panel."
+    "specimen, and for the median of the population. At the bottom, complete pooling. Bars may run out of the panel; "
+    "where the median of a specimen does, it stands at the edge with its interval."
 )
 PATIENT_CAPTION = (
     "Without measurement noise. Blue: material from the population, and the model error of a random specimen measured "
@@ -119,24 +52,24 @@ HOW_TO_READ = (
     "**By itself** (no pooling): only the data of the specimen. **Within the population** (partial pooling): the other "
     "specimens inform what its data do not determine, so a poorly measured specimen moves towards the population and a "
     "well measured one hardly moves.",
-    "**A new patient**: the median and spread of the population with the uncertainty of both. Use this range for "
+    "**A new specimen**: the median and spread of the population with the uncertainty of both. Use this range for "
     "someone who has not been measured.",
     "**Complete pooling** treats all specimens as one. Its interval shrinks with every measurement, however much "
-    "patients differ: it understates the uncertainty and is shown for comparison only.",
+    "specimens differ: it understates the uncertainty and is shown for comparison only.",
     "The specimens' model errors are taken to be independent, unless the discrepancy is shared. An error that all of "
     "them share (the same missing physics) does not average out: with --shared-discrepancy it is included in the "
-    "intervals of the population median and of a new patient.",
-    "The spread of a positive parameter is the sd of its logarithm: 0.3 means that two thirds of patients lie within "
+    "intervals of the population median and of a new specimen.",
+    "The spread of a positive parameter is the sd of its logarithm: 0.3 means that two thirds of specimens lie within "
     "about ± 30 % of the median.",
 )
 POINTS = 81
-"""Of the stress of a new patient."""
+"""Of the stress of a new specimen."""
 HEADERS = ["parameter", "unit", "quantity", "median", "95 % HPD"]
 """Of `readable_population`."""
 QUANTITIES = {
     "median": "median of the population",
     "spread": "spread between specimens",
-    "new patient": "a new patient",
+    "new patient": "a new specimen",
     "complete pooling": "complete pooling",
 }
 
@@ -174,11 +107,10 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
-        next_step="take a new patient into finite elements: tissuq export, structure or ensemble {run}"
-        if population.converged
-        else "sample again, with another --seed; see the first warning",
+        next_step=_next_step(population),
         picture=Picture(
-            "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
+            "answer", lambda: first_parameter_figure(population, unit),
+            "The first parameter of every specimen", SPECIMENS,
         ),
         tables=(
             Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), _note(population)),
@@ -190,6 +122,19 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         files=files | sources | of_covariates | laws | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update={"files": names, "material": law, **relocated}),
     )  # fmt: skip
+
+
+def _next_step(population: Population) -> str:
+    """Return what to do next: look at specimens that are far from the others before anything is computed with them."""
+    if not population.converged:
+        return "sample again, with another --seed; see the first warning"
+    if far := list(far_specimens(population)):
+        options = " ".join(f"--without {name}" for name in far)
+        return (
+            f"look at {', '.join(far)} first: the unit of the stresses, the area, the columns. Then fit again, or "
+            f"leave {'it' if len(far) == 1 else 'them'} out: {options}"
+        )
+    return "take a new specimen into finite elements: tissuq export, structure or ensemble {run}"
 
 
 def _note(population: Population) -> str:
@@ -210,15 +155,8 @@ def _share(half_width: float) -> str:
     return f"{significant(100 * half_width, 2)} %"
 
 
-def _first_parameter(population: Population, unit: StressUnit) -> Figure:
-    """Return the panel of the first parameter, for the head of a page."""
-    with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
-        population.draw(on_figure(figure, 1, 1), unit)
-    return figure
-
-
 def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
-    """Return what to expect of a new patient, and median and spread of the population.
+    """Return what to expect of a new specimen, and median and spread of the population.
 
     Of the initial shear modulus where it is a multiple of the first parameter, and of this parameter otherwise.
     """
@@ -238,7 +176,7 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
 
     spread = "spread between specimens" + (" (sd of the logarithm)" if is_log else "")
     return (
-        number(f"{words} of a new patient{patient_in_words(study)}", "new patient", factor / times, unit),
+        number(f"{words} of a new specimen{patient_in_words(study)}", "new patient", factor / times, unit),
         number(f"{words}, median of the population", "median", factor / times, unit),
         number(spread, "spread", 1.0 if is_log else factor / times, "" if is_log else unit),
     )
@@ -247,7 +185,7 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
 def _sections(
     study: PopulationStudy, bands: Mapping[LoadingMode, Bands], not_predicted: list[str]
 ) -> tuple[Section, ...]:
-    """Return what a page folds: every parameter, new patients, specimens, how to read it, how it was computed."""
+    """Return what a page folds: every parameter, new specimens, specimens, how to read it, how it was computed."""
     population, diagnostics, settings = study.population, study.population.diagnostics, study.settings
     is_one = len(population.symbols) == 1
     specimens = Picture(
@@ -261,11 +199,11 @@ def _sections(
         patient.append(
             Picture(
                 "new_patient", lambda: patient_figure(population, bands, study.unit),
-                "Predicted stress of a new patient", PATIENT_CAPTION, len(study.modes) == 1,
+                "Predicted stress of a new specimen", PATIENT_CAPTION, len(study.modes) == 1,
             )
         )  # fmt: skip
     if patient:
-        sections.append(Section("Stress of a new patient", tuple(patient)))
+        sections.append(Section("Stress of a new specimen", tuple(patient)))
     pairs = [[str(name), *_text(numbers)] for name, numbers in numbers_of(population.correlations()).items()]
     if pairs:
         table = Table(["parameters", "correlation between specimens", "95 % HPD"], pairs)
@@ -302,7 +240,7 @@ def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
 
 
 def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]:
-    """Return the stress of a new patient in every mode, with the model error and without; and why in some not."""
+    """Return the stress of a new specimen in every mode, with the model error and without; and why in some not."""
     bands, not_predicted = {}, []
     for mode in study.modes:
         ranges = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
@@ -321,7 +259,7 @@ def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]
 
 
 def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFrame:
-    """Return the stresses of new patients, indexed by stretch, and by mode where there are several."""
+    """Return the stresses of new specimens, indexed by stretch, and by mode where there are several."""
     import pandas as pd
 
     tables = {
@@ -400,8 +338,12 @@ def _lead(study: PopulationStudy) -> str:
         _text(table[symbol, name], factor)[1].strip("[]").replace(",", " to")
         for name in ("new patient", "complete pooling")
     )
+    far = " ".join(
+        f"{name} is {times:.2g} times as stiff as the others, which makes these intervals as wide as they are."
+        for name, times in far_specimens(study.population).items()
+    )
     return (
-        f"The median of {symbol} in the population is {middle} {unit}; for a patient who has not been measured"
+        f"The median of {symbol} in the population is {middle} {unit}; for a specimen that has not been measured"
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
-        f"say {complete} {unit}, which is no range of patients."
+        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
     )

@@ -20,7 +20,7 @@ __all__ = ["copy_of_covariates", "effects_of_covariates", "needed_of", "needed_t
 
 HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % HPD", "positive"]
 HEADERS_OF_NUMBERS = ["parameter", "quantity", "now", "with any number", "specimens in all", "more"]
-QUANTITIES = {"median": "median of the population", "new patient": "a new patient"}
+QUANTITIES = {"median": "median of the population", "new patient": "a new specimen"}
 COPY = "covariates-of-specimens"
 """The name of the table of covariates in a run's folder."""
 
@@ -47,7 +47,7 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
     return (
         Table(
             HEADERS_OF_EFFECTS, rows, "Effects of covariates", (1, 2),
-            f"Medians of the population are at {population.covariates.described({})}; a new patient has "
+            f"Medians of the population are at {population.covariates.described({})}; a new specimen has "
             f"{population.covariates.described(population.patient_covariates)}. Of the variance between specimens: "
             "the share that all covariates explain.",
         ),
@@ -55,7 +55,7 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
 
 
 def patient_in_words(study: PopulationStudy) -> str:
-    """Return what is known of the new patient, in brackets; nothing without covariates."""
+    """Return what is known of the new specimen, in brackets; nothing without covariates."""
     text = study.population.covariates.described(study.population.patient_covariates)
     return f" ({text})" if text else ""
 
@@ -82,7 +82,7 @@ def needed_table_of(study: PopulationStudy, needed: pd.DataFrame | None) -> tupl
     aim, rows = float(study.settings.aim or 0.0), []
     for row in needed.reset_index().to_dict("records"):
         total, floor = float(row["specimens"]), float(row["floor"])
-        none = "not reached: patients differ more" if floor else f"more than {MAX_SPECIMENS}"
+        none = "not reached: specimens differ more" if floor else f"more than {MAX_SPECIMENS}"
         cells = [none, ""] if isnan(total) else [f"{total:.0f}", f"{row['more']:.0f}"]
         shown = [f"± {percent(row['now'])}", f"± {percent(floor)}" if floor else ""]
         rows.append([str(row["parameter"]), QUANTITIES[str(row["quantity"])], *shown, *cells])
@@ -90,7 +90,7 @@ def needed_table_of(study: PopulationStudy, needed: pd.DataFrame | None) -> tupl
         Table(
             HEADERS_OF_NUMBERS, rows, f"Specimens like these for ± {percent(aim)} (95 %)", (1, 4),
             "Half the interval over the median. With so many specimens four of five populations reach the aim. However "
-            "many there are, patients differ as much as they do. By how much is not known well from few specimens, so "
-            "that the interval of a new patient with any number, which holds in four of five, may be wider than now.",
+            "many there are, specimens differ as much as they do. By how much is not known well from few specimens, so "
+            "that the interval of a new specimen with any number, which holds in four of five, may be wider than now.",
         ),
     )  # fmt: skip

@@ -82,7 +82,8 @@ def run_population(
             "noise is ambiguous: leave --noise-sd out, or convert the files."
         )
     known = settings.covariate_table(tests, folder)
-    covariates = covariates_of(known.values() if known else None, list(tests), known.place if known else None)
+    values = {name: row for name, row in known.values().items() if name not in settings.without} if known else None
+    covariates = covariates_of(values, list(tests), known.place if known else None)
     covariates.row(settings.new_patient)  # raises where there is no such patient, before specimens are fitted
     unit, noise_sd = _unit(tests), None
     if isinstance(settings.noise_sd, dict):

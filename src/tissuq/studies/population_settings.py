@@ -62,14 +62,14 @@ class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
     )
     new_patient: dict[str, str] = option(
         default_factory=dict,
-        help="What is known of the new patient, such as age=60,sex=f [mean of numbers, most frequent word].",
+        help="What is known of the new specimen, such as age=60,sex=f [mean of numbers, most frequent word].",
         parse=known_of_patient,
         group=COVARIATES,
     )
     aim: float | None = option(
         None,
         "Also say how many specimens like these it takes until half the 95 % interval of the population's median, and "
-        "that of a new patient, is this share of the median, such as 10%.",
+        "that of a new specimen, is this share of the median, such as 10%.",
         takes=str,
         parse=share("--aim"),
         gt=0,
@@ -83,6 +83,9 @@ class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
     discrepancy: str = option("auto", "Discrepancy of every specimen.")
     shared_discrepancy: bool = option(
         False, "Take the model error to be the same in all specimens: it does not average out."
+    )
+    without: tuple[str, ...] = option(
+        (), "Specimen to leave out, by its name in the table of specimens; repeat for more."
     )
     mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
 
@@ -116,7 +119,15 @@ class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
         return covariate_columns(folder / self.files[0], self.specimen, self.covariate, **self.reading_options)
 
     def readings(self, folder: Path = Path()) -> dict[str, list[Reading]]:
-        """Read the tests of every specimen; relative files lie in ``folder``."""
+        """Read the tests of every specimen but those that are left out; relative files lie in ``folder``."""
+        readings = self._all_readings(folder)
+        if unknown := [name for name in self.without if name not in readings]:
+            raise InputError(
+                f"--without {unknown[0]}: there is no such specimen; the specimens are {', '.join(readings)}."
+            )
+        return {name: of_one for name, of_one in readings.items() if name not in self.without}
+
+    def _all_readings(self, folder: Path) -> dict[str, list[Reading]]:
         from tissuq.experiments.reading.several_files import read_column
         from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 

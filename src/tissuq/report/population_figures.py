@@ -1,0 +1,84 @@
+"""Figures of a population: its specimens by parameter, and the stress of a new specimen over measured curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from tissuq.drawing import pieces
+from tissuq.drawing.panels import on_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import StressUnit
+from tissuq.population.picture import height_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tissuq.population import Population
+
+__all__ = ["Bands", "first_parameter_figure", "patient_figure", "specimens_figure"]
+
+Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
+"""Stress of a new specimen with the model error, and of the material alone."""
+
+
+def first_parameter_figure(population: Population, unit: StressUnit) -> Figure:
+    """Return the panel of the first parameter, for the head of a page."""
+    with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
+        population.draw(on_figure(figure, 1, 1), unit)
+    return figure
+
+
+def specimens_figure(population: Population, unit: StressUnit) -> Figure:
+    """Return `Population.plot` as a figure of the report, its panels side by side."""
+    count = len(population.symbols)
+    with new_figure(
+        6.4 if count == 1 else min(3.6 * count + 0.6, 12.0), height_of(len(population.names)) + 0.7
+    ) as figure:
+        population.draw(on_figure(figure, count, count), unit)
+    return figure
+
+
+def patient_figure(population: Population, bands: Mapping[LoadingMode, Bands], unit: StressUnit) -> Figure:
+    """Return the stress of a new specimen, with and without the model error, over the curves of the specimens.
+
+    Parameters
+    ----------
+    population : Population
+    bands : mapping of LoadingMode to two pandas.DataFrame
+        From `Population.new_patient`, with the discrepancy and without; a panel each.
+    unit : StressUnit
+    """
+    with new_figure(6.6 if len(bands) == 1 else min(4.6 * len(bands), 13.8), 4.2) as figure:
+        panels = figure.subplots(1, len(bands), squeeze=False)[0]
+        for axis, (mode, mode_bands) in zip(panels, bands.items(), strict=True):
+            _draw_patient(axis, population, mode, mode_bands, unit)
+        panels[0].set_ylabel(f"engineering stress [{unit.name}]")
+        panels[0].legend(fontsize=9)
+        if len(bands) == 1:
+            panels[0].set_title(f"Expected for a new specimen: {next(iter(bands)).name}")
+        else:
+            figure.suptitle("Expected for a new specimen")
+    return figure
+
+
+def _draw_patient(axis: Axes, population: Population, mode: LoadingMode, bands: Bands, unit: StressUnit) -> None:
+    tests = [test for posterior in population.posteriors.values() for test in posterior.model.experiment.tests]
+    for index, data in enumerate(test for test in tests if test.mode == mode):
+        order = np.argsort(data.stretch, kind="stable")
+        axis.plot(data.stretch[order], data.stress[order] / unit.to_mpa, color=BASE, lw=0.7, alpha=0.7,
+                  label="" if index else "measured specimens")  # fmt: skip
+    band, material_alone = bands
+    low, high = band["low"] / unit.to_mpa, band["high"] / unit.to_mpa
+    pieces.band(axis, band["stretch"], low, high, label="a new specimen, 95 %")
+    pieces.line(axis, band["stretch"], band["median"] / unit.to_mpa, width=1.8, label="median")
+    for end in ("low", "high"):
+        axis.plot(material_alone["stretch"], material_alone[end] / unit.to_mpa, ":", color=TRUTH, lw=1.4,
+                  label="" if end == "high" else "95 % of the material alone")  # fmt: skip
+    axis.set_xlabel(mode.controls[0].name)
+    axis.set_title(mode.name)
