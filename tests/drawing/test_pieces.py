@@ -36,6 +36,23 @@ def test_measurements_have_their_standard_errors(axis):
     assert len(axis.containers) == 1  # nothing where there are none
 
 
+def test_measurements_of_unloading_look_different_and_are_named(axis):
+    x, y = np.array([1.0, 1.2, 1.1]), np.array([0.0, 2.0, 0.7])
+    pieces.points(axis, x, y, is_back=np.array([False, False, True]))
+    loading, back = axis.lines
+    assert [loading.get_label(), back.get_label()] == ["measured, loading", "measured, unloading"]
+    assert list(back.get_xdata()) == [1.1]
+    assert (back.get_marker(), back.get_markerfacecolor()) != (loading.get_marker(), loading.get_markerfacecolor())
+    pieces.points(axis, x, y, is_back=np.zeros(3, dtype=bool))
+    assert axis.lines[-1].get_label() == "measured"
+
+
+def test_the_line_at_the_end_of_what_was_measured_is_explained_once(axis):
+    axis.set_xlim(0.5, 2.0)
+    pieces.outside(axis, 0.8, 1.5, "extrapolated")
+    assert axis.get_legend_handles_labels()[1] == ["extrapolated", "end of the measured strains"]
+
+
 def test_very_many_measurements_are_summed_up_in_bins(axis):
     x = np.linspace(0, 1, 12_000)
     pieces.points(axis, x, 2 * x)

@@ -169,3 +169,11 @@ def test_what_is_known_of_the_curves_is_not_computed_anew(posterior, monkeypatch
 def test_the_data_are_json_of_at_most_a_few_digits(data):
     text = json.dumps(data, allow_nan=False)
     assert max(map(len, re.findall(r"\d+\.?\d*", text))) <= 11
+
+
+def test_measurements_of_unloading_are_told_from_those_of_loading():
+    stretch = [*np.linspace(1, 1.3, 6), *np.linspace(1.27, 1.03, 5)]
+    cyclic = tq.fit(tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.01, 1), discrepancy="none", noise_sd=0.01)
+    (test, *_) = chart_data({"none": cyclic}, "none", KPA)["tests"]
+    back = [at for at, is_back in zip(test["measured_at"], test["is_back"], strict=True) if is_back]
+    assert sorted(back) == pytest.approx(sorted(stretch[6:]), rel=1e-4)

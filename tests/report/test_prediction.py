@@ -181,3 +181,11 @@ def test_the_page_repeats_what_the_fit_says_of_predicting_the_mode(posterior, tm
         assert [use.reason for use in prediction_result(found, settings, tmp_path, tmp_path).uses] == reasons
     (tmp_path / "run" / "result.json").write_text("{")
     assert prediction_result(found, settings, tmp_path, tmp_path).uses == ()
+
+
+def test_compression_that_no_test_was_in_is_explained():
+    data = tq.simulate("neo-hookean", {"C10": 0.4}, np.linspace(1.0, 1.6, 8), 0.01, seed=1)
+    tension = tq.fit(data, discrepancy="none", noise_sd=0.01)
+    assert predicted(tension, mode="equibiaxial", stretch=[0.85, 0.9, 1.0]).is_compression_deduced
+    assert not predicted(tension, mode="equibiaxial", stretch=[1.0, 1.1]).is_compression_deduced
+    assert not predicted(tension, mode="simple-shear", stretch=[-0.2, 0.2]).is_compression_deduced

@@ -18,6 +18,8 @@ __all__ = ["band", "cut_off", "density", "forest", "heat", "line", "outside", "p
 
 FloatArray = NDArray[np.float64]
 
+EDGE = "end of the measured strains"
+"""What the dashed line is where a hatched part begins."""
 MAX_POINTS, BINS = 5000, 120
 """Measurements that are drawn one by one, and bins in which more of them are summed up."""
 
@@ -67,9 +69,20 @@ def points(
     error: FloatArray | None = None,
     label: str = "measured",
     marker: str = "o",
+    is_back: NDArray[np.bool_] | None = None,
     **looks: Any,
 ) -> None:
-    """Draw measurements, with their standard errors where there are any; of very many the mean and 95 % of bins."""
+    """Draw measurements, with their standard errors where there are any; of very many the mean and 95 % of bins.
+
+    Those of unloading (``is_back``) are hollow triangles.
+    """
+    if is_back is not None and is_back.any():
+        hollow = {"mfc": "white", "mec": INK, "mew": 0.8 * relative_size(), **looks}
+        branches = (~is_back, "loading", marker, looks), (is_back, "unloading", "v", hollow)
+        for rows_of_branch, words, sign, look in branches:
+            points(axis, x[rows_of_branch], y[rows_of_branch], error=None if error is None else error[rows_of_branch],
+                   label=f"{label}, {words}" if label else "", marker=sign, **look)  # fmt: skip
+        return
     size = relative_size()
     style: dict[str, Any] = {"color": INK, "ms": 3 * size, "zorder": 4} | looks
     if len(x) > MAX_POINTS:
@@ -152,16 +165,17 @@ def heat(
 
 
 def outside(axis: Axes, low: float, high: float, label: str) -> None:
-    """Hatch an axis where it goes beyond an interval of its horizontal values."""
+    """Hatch an axis where it goes beyond an interval of its horizontal values, which ends at dashed lines."""
     start_limit, end_limit = axis.get_xlim()
     margin = 0.011 * (end_limit - start_limit)  # that of the axis beyond the last point is no place of its own
+    edge_label = EDGE
     for start, end in ((start_limit, min(low, end_limit)), (max(high, start_limit), end_limit)):
         if end - start > 3 * margin:
-            axis.axvspan(start, end, facecolor="none", edgecolor=BASE, alpha=0.35, hatch="///", lw=0, zorder=0,
+            axis.axvspan(start, end, facecolor="none", edgecolor=BASE, alpha=0.5, hatch="///", lw=0, zorder=0,
                          label=label)  # fmt: skip
-            label = ""
             edge = end if start == start_limit else start
-            axis.axvline(edge, color=BASE, lw=1.1 * relative_size(), ls="--", zorder=0.5)
+            axis.axvline(edge, color=BASE, lw=1.1 * relative_size(), ls="--", zorder=0.5, label=edge_label)
+            label = edge_label = ""
 
 
 def cut_off(axis: Axes, low: ArrayLike, high: ArrayLike, unit: str) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tissuq.drawing.panels import Panels, shortened, small_panels
 from tissuq.drawing.pieces import points
 from tissuq.drawing.style import BASE, inline_svg, relative_size
+from tissuq.experiments.branches import unloading
 from tissuq.experiments.modes import LoadingMode, Path
 from tissuq.experiments.units import stress_unit
 
@@ -78,6 +79,11 @@ class Curve:
         return controls[0].name if len(controls) == 1 else "stretch"
 
     @property
+    def is_back(self) -> NDArray[np.bool_]:
+        """Which measurements (n,) are of unloading."""
+        return unloading(self.points, self.mode.reference)
+
+    @property
     def quantity(self) -> str:
         """What the mode calls the stress."""
         return self.mode.stresses[self.channel]
@@ -90,7 +96,8 @@ def draw_curves(drawn: Panels, curves: Sequence[Curve], unit_name: str) -> None:
         axis.axhline(0, color=BASE, lw=0.6 * size, zorder=0.5)
         axis.axvline(float(curve.path.abscissa(curve.mode.reference)), color=BASE, lw=0.6 * size, zorder=0.5)
         error = curve.standard_error / unit.to_mpa
-        points(axis, curve.abscissa, curve.stress / unit.to_mpa, error=error, label="measured")
+        points(axis, curve.abscissa, curve.stress / unit.to_mpa, error=error, label="measured",
+               is_back=curve.is_back)  # fmt: skip
         axis.set_xlabel(curve.abscissa_name)
         if number % drawn.columns == 0 or len(curve.mode.stresses) > 1:
             axis.set_ylabel(f"{curve.quantity} [{unit.name}]")

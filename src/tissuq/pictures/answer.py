@@ -108,7 +108,7 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
             band(axis, of_curve.stretch[indices], within(low[indices], limits), within(high[indices], limits),
                  is_path=is_curve)  # fmt: skip
             line(axis, of_curve.stretch[indices], median[indices], is_path=is_curve)
-        points(axis, curve.abscissa, measured)
+        points(axis, curve.abscissa, measured, is_back=curve.is_back)
         axis.set_ylim(limits)
         end = f" [{unit.name}]{count}"
         axis.set_title(f"{shortened(curve.name, drawn.letters - len(end))}{end}")
@@ -128,7 +128,7 @@ def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     bands = [(described.measurements, 0.18 if is_one else 0.12, BAND, f"{percent} of measurements")]
     bands += [(described.stress, 0.38, BAND, f"{percent} of the stress")] if is_one else []
     bands += [(material_stress, 0.13, TRUTH, "")] if material_stress and is_one else []
-    lines = [(described.stress, BAND, "-", "" if is_one else "stress, median")]
+    lines = [(described.stress, BAND, "-", "stress, median")]
     material = described.solution.model.material.name
     lines += [(material_stress, TRUTH, "--", f"{material} alone{f', {percent}' * is_one}")] if material_stress else []
     for number, (indices, is_curve) in enumerate(described.ways):
@@ -142,7 +142,7 @@ def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
                  label="" if number else label)  # fmt: skip
         rows = slice(None) if is_one else indices
         points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
-               marker=MARKERS[number % len(MARKERS)])  # fmt: skip
+               marker=MARKERS[number % len(MARKERS)], is_back=curve.is_back[rows])  # fmt: skip
     axis.set_ylim(limits)
     cut_off(axis, limit_values[0], limit_values[1], unit.name)
     axis.locator_params(axis="x", nbins=6)
@@ -169,7 +169,7 @@ def _draw_strips(drawn: Panels, solution: Solution, prob: float) -> None:
     for axis, curve in zip(drawn.strips, solution.model.experiment.curves, strict=True):
         _draw_share(axis, solution, curve, prob)
         axis.locator_params(axis="y", nbins=SHARE_TICKS)
-        axis.set_title("discrepancy, % of the stress", fontsize="small", pad=2)
+        axis.set_title(f"discrepancy, % of the stress: median, {100 * prob:.4g} %", fontsize="small", pad=2)
     ends = np.array([axis.get_ylim() for axis in drawn.strips])
     for axis in drawn.strips:
         axis.set_ylim(ends[:, 0].min(), ends[:, 1].max())

@@ -94,15 +94,18 @@ def ridges(
     Those whose interval misses the true value are grey.
     """
     levels, size = rows(axis, list(solutions)), relative_size()
+    words = "posterior density", f"{100 * prob:.4g} % HPD", "median"
     for level, solution in zip(levels, solutions.values(), strict=True):
         factor, label = _scale(solution, name, unit)
         marginal = marginal_of(solution, name)
         (low, high), values = marginal.hdi(prob), _values(marginal)
         color = BAND if truth is None or low <= truth <= high else BASE
-        density(axis, values / factor, marginal.pdf(values), level=level, top=RIDGE, color=color)
-        axis.plot([low / factor, high / factor], [level, level], color=color, lw=4 * size, solid_capstyle="butt")
+        density(axis, values / factor, marginal.pdf(values), level=level, top=RIDGE, color=color, label=words[0])
+        axis.plot([low / factor, high / factor], [level, level], color=color, lw=4 * size, solid_capstyle="butt",
+                  label=words[1])  # fmt: skip
         middle = float(marginal.quantile(0.5)) / factor
-        axis.plot(middle, level, "o", color="white", mec=INK, ms=5 * size, zorder=3)
+        axis.plot(middle, level, "o", color="white", mec=INK, ms=5 * size, zorder=3, label=words[2], ls="")
+        words = "", "", ""
         axis.set_xlabel(label)
     if truth is not None:
         shown = truth / factor

@@ -50,4 +50,4 @@ def shade_instability(axis: Axes, stable_range: StableRange | None, low: float, 
         start, stop = min(max(sure, low), high), min(max(end, low), high)
         if start != stop:
             axis.axvspan(start, stop, facecolor=UNSTABLE, alpha=0.16, lw=0, zorder=0, label=label)
-            axis.axvline(start, color=UNSTABLE, lw=1.2 * size, ls="-.", zorder=0.5)
+            axis.axvline(start, color=UNSTABLE, lw=1.2 * size, ls="-.", zorder=0.5, label="where that begins")

@@ -47,8 +47,9 @@ def draw_specimens(
         )
         panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new specimen, 95 %")
         panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population, 95 %")
-        forest(panel, -0.55, complete[0], np.mean(complete), complete[1], color=TRUTH, width=4, mark="D", size=4,
-               label="complete pooling (all as one specimen)")  # fmt: skip
+        words = "complete pooling (all as one specimen)"
+        panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label=words)
+        panel.plot([float(np.mean(complete))], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
         _draw_specimens(panel, estimates, small)
         panel.set_xlim(*_limits(estimates, [*new, *median, *complete]))
         _say_what_is_outside(panel, estimates, new)

@@ -47,6 +47,7 @@ class _Test(NamedTuple):
     measured_at: FloatArray
     measured: FloatArray
     is_curve: bool = True
+    is_back: NDArray[np.bool_] = np.zeros(0, dtype=bool)
 
     @property
     def abscissa(self) -> FloatArray:
@@ -121,7 +122,8 @@ def _measured(described: Sequence[Described]) -> Iterator[_Test]:
             rows = _spread(np.argsort(curve.abscissa, kind="stable") if described_curve.points.ndim == 1 else indices)
             named = f"{name}, path {number}" if len(described_curve.ways) > 1 else name
             points = described_curve.points[_drawn(indices, is_curve)]
-            yield _Test(named, curve.mode, curve.channel, points, curve.abscissa[rows], curve.stress[rows], is_curve)
+            at, stress, is_back = curve.abscissa[rows], curve.stress[rows], curve.is_back[rows]
+            yield _Test(named, curve.mode, curve.channel, points, at, stress, is_curve, is_back)
 
 
 def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -198,6 +200,7 @@ def _test(test: _Test, basis: FloatArray, unit: StressUnit) -> dict[str, Any]:
         "x": _rounded(test.abscissa),
         "measured_at": _rounded(test.measured_at),
         "measured": _rounded(test.measured / unit.to_mpa),
+        "is_back": test.is_back.tolist(),
         "basis": [[_rounded(column) for column in columns] for columns in basis],
     }
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
-from tissuq.drawing.panels import Panels, columns_of, limits_of, on_figure, shortened
+from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BASE, TRUTH, new_figure, save_figure
 from tissuq.experiments.curve import Curve
@@ -107,7 +107,7 @@ def predictive_figure(
                 shade_instability(axis, posterior.stable_ranges.get(curve.mode.name), *ends)
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
-            points(axis, curve.abscissa, curve.stress / unit.to_mpa)
+            points(axis, curve.abscissa, curve.stress / unit.to_mpa, is_back=curve.is_back)
             axis.locator_params(axis="x", nbins=6)
             if len(curves) > 1:
                 axis.set_xlabel(curve.abscissa_name, fontsize=9)
@@ -126,9 +126,11 @@ def marginal_figure(
     posteriors: Mapping[str, Posterior], symbol: str, unit: StressUnit, truth: float | None = None, width: float = 8.2
 ) -> Figure:
     """Return the marginal posteriors of one stress parameter, a row a formulation, with 95 % HPD and true value."""
-    with new_figure(width, 0.62 * len(posteriors) + 1.1) as figure:
+    with new_figure(width, 0.62 * len(posteriors) + 1.4) as figure:
         solutions = {name: posterior.solution for name, posterior in posteriors.items()}
-        ridges(figure.subplots(), solutions, symbol, unit, truth=truth)
+        axis = figure.subplots()
+        ridges(axis, solutions, symbol, unit, truth=truth)
+        legend_above(figure, [axis])
     return figure
 
 

@@ -201,7 +201,7 @@ def curve_figure(study: LawStudy) -> Figure:
     with new_figure(8.2, (4.2 if len(curves) == 1 else 3.4) * -(-len(curves) // columns) + 0.7) as figure:
         axes = on_figure(figure, len(curves), columns).axes
         for axis, curve in zip(axes, curves, strict=True):
-            pieces.points(axis, curve.abscissa, curve.stress / scale, color=BASE)
+            pieces.points(axis, curve.abscissa, curve.stress / scale, color=BASE, is_back=curve.is_back)
             points = points_along(curve, LINE_POINTS)
             states = curve.path.at(points)
             for number, name in enumerate(names):

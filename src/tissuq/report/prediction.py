@@ -20,6 +20,7 @@ from tissuq.errors import InputError
 from tissuq.prediction.bands import Band
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
+from tissuq.report.stability import SAME_STATES
 from tissuq.report.tables import interval, significant
 from tissuq.report.writer import read_record
 from tissuq.result_warning import in_shell
@@ -42,6 +43,7 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
+NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
 MAX_ROWS = 13
 """Number of rows of the table of bands on page and terminal; the files have all."""
 MAX_SHARE, MAX_STRESS, MIN_STRESS = 10.0, 1e5, 1e-12
@@ -161,7 +163,7 @@ def _shares(prediction: Prediction) -> list[Number]:
         remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
         numbers.append(Number("measurements inside the band", value, remark=remark))
     beyond = count - int(prediction.is_calibrated.sum())
-    remark = "outside the measured range of I1 and I2" if beyond else "all within the measured range"
+    remark = "outside the measured range of I1 and I2" if beyond else "all within the measured range of I1 and I2"
     numbers.append(Number("extrapolated", f"{beyond / count:.0%} of the points", remark=remark))
     return numbers
 
@@ -175,10 +177,10 @@ def _next_step(prediction: Prediction, run: str) -> str:
 
 
 def _caption(prediction: Prediction) -> str:
-    share = f"{100 * prediction.prob:.4g} %"
+    share, deduced = f"{100 * prediction.prob:.4g} %", NOT_COMPRESSED * prediction.is_compression_deduced
     return (
         f"Dark: {share} of the stress itself, noise off. Light: {share} of measurements of it. Hatched: an invariant "
-        "is larger than in any measurement of the run; there bands may run out of the panel."
+        f"is larger than in any measurement of the run; there bands may run out of the panel.{deduced}"
     )
 
 
@@ -213,6 +215,7 @@ def _sections(prediction: Prediction) -> tuple[Section, ...]:
         "Calibrated: within the range in which both invariants I1 and I2 were measured (in a mode of the run, the "
         "stretches that were). Even inside that range one mode does not determine how the energy depends on the other "
         "invariant, so bands of other modes are wider than those of the measured mode.",
+        SAME_STATES,
     ]
     if prediction.kinds[0]:
         reading.append(

@@ -9,10 +9,14 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.report.result import Section, Table
 from tissuq.report.tables import Row, known_number, percent, stretch_in_words
 
-__all__ = ["STABILITY", "stability_cells", "stability_rows", "stability_section"]
+__all__ = ["SAME_STATES", "STABILITY", "stability_cells", "stability_rows", "stability_section"]
 
 STABILITY = ("stable", "lost_at", "lost_at_low", "lost_at_high")
 """Of `stability_cells`."""
+SAME_STATES = (
+    "Tension in one mode may be compression in another: what is pressed to 0.6 along two axes (equibiaxial "
+    "compression) grows to 1 / 0.6² = 2.8 along the third, for its volume stays: the state of uniaxial tension to 2.8."
+)
 HEADERS = [
     "discrepancy", "loading mode", "stretch", "stable throughout, probability", "lost in compression at",
     "lost in tension at",
@@ -80,4 +84,4 @@ def stability_section(rows: list[Row]) -> Section:
         ]
         for row in rows
     ]
-    return Section("Where it is stable", (WORDS, Table(HEADERS, cells, text_columns=(1,))))
+    return Section("Where it is stable", (WORDS, Table(HEADERS, cells, text_columns=(1,)), SAME_STATES))

@@ -110,6 +110,18 @@ class Prediction:
         return calibrated_points(self.posterior, self.mode, self.points)
 
     @property
+    def is_compression_deduced(self) -> bool:
+        """Whether points in compression count as measured, though no test was: other modes reach the same states."""
+        controls, tests = self.mode.controls, self.posterior.model.experiment.tests
+        if (
+            len(controls) > 1
+            or float(self.mode.reference) != 1
+            or any((t.stretch < t.mode.reference).any() for t in tests)
+        ):
+            return False
+        return bool((self.is_calibrated & (self.points < 1)).any())
+
+    @property
     def is_data_calibrated(self) -> NDArray[np.bool_]:
         """Of which measurements (n,) that is true."""
         assert self.data is not None  # noqa: S101 (requested only if there are measurements)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.branches import turning_points
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
@@ -18,8 +19,6 @@ from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 __all__ = ["BRANCHES", "Cycle", "find_cycles", "of_cycle"]
 
 BRANCHES = ("loading", "unloading")
-REVERSAL = 0.1
-"""Share of the range of stretches by which a test must go back for a new branch to begin."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
             start + int(np.argmax(np.abs(stretch[start:stop] - stretch[start]))) for start, stop in pairwise(starts)
         )
         return [Cycle(labels[s], s, p, t) for (s, t), p in zip(pairwise(starts), peaks, strict=True)]
-    ends = [0, *_turning_points(stretch), len(stretch) - 1]
+    ends = [0, *turning_points(stretch), len(stretch) - 1]
     bounds = [*ends[0:-1:2], ends[-1]]
     return [
         Cycle(str(number), start, ends[2 * number - 1], stop + (stop == len(stretch) - 1))
@@ -113,24 +112,3 @@ def _cycle_labels(table: Table) -> list[str]:
     if not sets:
         return numbers
     return [f"{name} {number}" for name, number in zip(table.texts(sets[0]), numbers, strict=True)]
-
-
-def _turning_points(stretch: Column) -> list[int]:
-    """Return the rows where the test turns back by a notable share of its range."""
-    reversal = REVERSAL * float(np.ptp(stretch))
-    turns: list[int] = []
-    low = high = direction = 0
-    values = stretch.tolist()
-    directions = np.sign(np.diff(stretch))
-    turning = np.flatnonzero(directions[1:] != directions[:-1]) + 1  # between them nothing is highest or lowest
-    for row in [*turning.tolist(), len(stretch) - 1]:
-        value = values[row]
-        high = row if value > values[high] else high
-        low = row if value < values[low] else low
-        rises, falls = value - values[low] > reversal, values[high] - value > reversal
-        if direction == 0:
-            direction = rises - falls
-        elif falls if direction > 0 else rises:
-            turns.append(high if direction > 0 else low)
-            direction, low, high = -direction, row, row
-    return turns

@@ -8,6 +8,7 @@
   const still = holder.parentElement.querySelector(".still");
   const parts = [
     { name: "measured", keys: ["measured"], on: true },
+    { name: "measured, unloading (hollow)", keys: ["unloading"], on: true },
     { name: "material + discrepancy + noise", keys: ["low", "high"], on: true, fill: "rgba(0, 114, 178, 0.16)" },
     { name: "material + discrepancy", keys: ["stress_low", "stress_high", "median"], on: true, fill: "rgba(0, 114, 178, 0.34)" },
     { name: "material alone", keys: ["alone_low", "alone_high", "alone"], on: true, fill: "rgba(213, 94, 0, 0.16)" },
@@ -15,7 +16,7 @@
     { name: "your parameters", keys: ["yours"], on: false },
   ];
   const lines = {
-    measured: { stroke: "#222222" }, median: { stroke: "#0072b2", width: 2 }, alone: { stroke: "#b84f00", width: 2 },
+    measured: { stroke: "#222222" }, unloading: { stroke: "#222222" }, median: { stroke: "#0072b2", width: 2 }, alone: { stroke: "#b84f00", width: 2 },
     discrepancy: { stroke: "#8a3d74", width: 2, dash: [2, 3] }, yours: { stroke: "#007a59", width: 2, dash: [6, 4] },
   };
   const keys = parts.flatMap(part => part.keys), values = data.parameters.map(parameter => parameter.value);
@@ -27,6 +28,7 @@
     return made;
   };
   const number = value => value == null || !Number.isFinite(value) ? "–" : String(Number(value.toPrecision(3)));
+  const isMeasured = key => key === "measured" || key === "unloading";
   const isOn = key => parts.some(part => part.on && part.keys.includes(key));
 
   // A column of the view at any place of its abscissa: linear between its points.
@@ -63,14 +65,14 @@
   };
   // Every measurement has a row of its own between the points of the bands.
   const columns = () => {
-    const many = keys.filter(key => key !== "measured").map(key => [key, column(key)]), of = Object.fromEntries(many);
+    const many = keys.filter(key => !isMeasured(key)).map(key => [key, column(key)]), of = Object.fromEntries(many);
     return [rows.map(row => row.x), ...keys.map(key => rows.map(row =>
-      key === "measured" ? row.measured : row.point == null ? at(of[key], row.x) : of[key] ? of[key][row.point] : null))];
+      isMeasured(key) ? (row.measured != null && row.isBack === (key === "unloading") ? row.measured : null) : row.point == null ? at(of[key], row.x) : of[key] ? of[key][row.point] : null))];
   };
   const arrange = () => {
-    rows = test.x.map((x, point) => ({ x, point, measured: null }));
+    rows = test.x.map((x, point) => ({ x, point, measured: null, isBack: false }));
     if (test.is_curve) {
-      rows.push(...test.measured_at.map((x, index) => ({ x, point: null, measured: test.measured[index] })));
+      rows.push(...test.measured_at.map((x, index) => ({ x, point: null, measured: test.measured[index], isBack: test.is_back[index] })));
       rows.sort((a, b) => a.x - b.x);
     } else test.measured.forEach((value, index) => { rows[index].measured = value; });
   };
@@ -91,6 +93,7 @@
   const hover = element("p", { className: "chart-hover soft" }, holder);
   hover.setAttribute("aria-hidden", "true");
   const where = element("div", { className: "chart-row" }, holder);
+  element("span", { className: "chart-dashes", title: "drag the dashed line" }, where);
   const label = element("label", { textContent: "" }, where), words = element("span", {}, label);
   const typed = element("input", { type: "number", step: "any" }, label);
   const slid = element("input", { type: "range" }, where);
@@ -106,14 +109,12 @@
   button("−", "zoom out", () => zoom(2));
   button("all", "show the whole curve", () => look(null));
 
-  const more = element("details", { open: innerWidth > 820 }, holder);
-  element("summary", { textContent: "parts and parameters" }, more);
-  const group = name => {
-    const set = element("fieldset", { className: "chart-row" }, more);
+  const group = (name, parent) => {
+    const set = element("fieldset", { className: "chart-row" }, parent);
     element("legend", { textContent: name }, set);
     return set;
   };
-  const switches = group("shown, lines with their 95 % bands");
+  const switches = group("shown, lines with their 95 % bands", holder);
   for (const part of parts) {
     const label = element("label", {}, switches), line = part.keys.find(key => lines[key]);
     part.box = element("input", { type: "checkbox", checked: part.on }, label);
@@ -121,7 +122,9 @@
     label.append(part.name);
     part.box.addEventListener("change", () => { part.on = part.box.checked; refresh(); });
   }
-  const sliders = group("your parameters of the material alone");
+  const more = element("details", { open: innerWidth > 820 }, holder);
+  element("summary", { textContent: "parameters" }, more);
+  const sliders = group("your parameters of the material alone", more);
   const write = data.parameters.map((parameter, index) => {
     const label = element("label", {}, sliders), name = element("span", {}, label);
     const step = (parameter.high - parameter.low) / 200 || "any";
@@ -214,10 +217,10 @@
     return [Math.min(low, Math.max(low - reach, Math.min(...other, low))), Math.max(high, Math.min(high + reach, Math.max(...other, high)))];
   };
   const series = key => {
-    const asPoints = key === "measured" || !test.is_curve;
+    const asPoints = isMeasured(key) || !test.is_curve, stroke = (lines[key] || { stroke: "#0072b2" }).stroke;
     return {
       show: isOn(key), spanGaps: true, stroke: "transparent", ...lines[key], paths: asPoints ? () => null : undefined,
-      points: asPoints ? { show: true, size: key === "measured" ? 5 : 4, fill: (lines[key] || { stroke: "#0072b2" }).stroke } : { show: false },
+      points: asPoints ? { show: true, size: isMeasured(key) ? 5 : 4, fill: key === "unloading" ? "#ffffff" : stroke } : { show: false },
     };
   };
   const refresh = () => {
@@ -225,16 +228,26 @@
     plot.setData(columns());
     readout.textContent = sentence(spot);
   };
+  // The width of an axis: that of its longest number, so that its label stands beside it.
+  const room = (chart, texts, index) => {
+    const axis = chart.axes[index];
+    chart.ctx.save();
+    chart.ctx.font = axis.font[0];
+    const longest = Math.max(0, ...(texts || []).map(text => chart.ctx.measureText(text).width));
+    chart.ctx.restore();
+    return Math.max(48, Math.ceil(axis.ticks.size + axis.gap + 8 + longest / devicePixelRatio));
+  };
   const draw = () => {
     const width = canvas.clientWidth, position = key => keys.indexOf(key) + 1, [low, high] = range();
     if (plot) plot.destroy();
     arrange();
-    for (const part of parts) part.box.parentElement.hidden = !view.alone && (part.keys.includes("alone") || part.keys.includes("discrepancy"));
+    for (const part of parts) part.box.parentElement.hidden = !view.alone && (part.keys.includes("alone") || part.keys.includes("discrepancy")) ||
+      part.keys.includes("unloading") && !test.is_back.includes(true);
     plot = new uPlot({
       width, height: Math.round(Math.min(360, Math.max(220, 0.6 * width))), legend: { show: false },
       pxAlign: 0, cursor: { drag: { x: true, y: true, uni: 20, setScale: false }, bind: { dblclick: () => () => look(null) } },
       scales: { x: { time: false, range: () => zoomed ? zoomed.x : range() }, y: { range: () => zoomed ? zoomed.y : limits() } },
-      axes: [{ label: test.control, labelSize: 22, size: 34 }, { label: `engineering stress [${data.unit}]`, labelSize: 22, size: 48 }],
+      axes: [{ label: test.control, labelSize: 22, size: 34 }, { label: `engineering stress [${data.unit}]`, labelSize: 22, size: room }],
       series: [{}, ...keys.map(series)],
       bands: parts.filter(part => part.fill && test.is_curve).map(part => ({ series: [position(part.keys[1]), position(part.keys[0])], fill: part.fill })),
       hooks: {
