@@ -44,7 +44,7 @@ def test_the_exit_status_is_3_and_the_message_names_the_discrepancy(fitted):
 
 def test_the_report_warns_and_shows_rhat_and_ess(fitted, here):
     report = (here / "runs" / "specimen" / "report.html").read_text()
-    assert f'<div class="warning problem">{VERDICT}</div>' in report
+    assert f"First warning: the result must not be used as it is</strong>{VERDICT}</div>" in report
     assert '<th scope="col">R-hat</th><th scope="col">ESS</th>' in report
     assert "<td>1.730</td><td>12</td>" in report
 
@@ -82,6 +82,6 @@ def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_resul
     assert all(row["rhat"] == 1.73 and row["log_evidence"] is None for row in nuts)
     assert len(list((here / "run" / "posterior").glob("*-nuts.nc"))) == 7
     report = (here / "run" / "report.html").read_text()
-    assert len(re.findall(rf'class="warning [^>]*>[^<]*{re.escape(VERDICT)}', report)) == 1
+    assert len(re.findall(rf'class="warning [^>]*><strong[^<]*</strong>[^<]*{re.escape(VERDICT)}', report)) == 1
     assert "none (nuts), constant (nuts), linear (nuts), quadratic (nuts), mooney-rivlin (nuts)" in report
     assert "Two independent routes" in report

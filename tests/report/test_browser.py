@@ -200,6 +200,28 @@ def test_the_names_of_rows_stay_in_view_where_a_table_is_moved(tmp_path):
             assert after == [before[0], before[1] - 90 * is_moved]
 
 
+def test_what_is_wider_than_a_small_screen_says_so_and_text_is_wrapped(tmp_path):
+    table = Table(["law", *"abcdefgh"], [["neo-hookean", *["0.123 ± 0.001"] * 8]])
+    sections = (Section("Laws", (table, Preformatted("word " * 60), Preformatted("x" * 300))),)
+    write_result(Result(command="fit", title="Which law", subject="a test", sections=sections), tmp_path)
+    for width, is_cut in ((1600, False), (400, True)):
+        with opened(tmp_path / "report.html", width) as page:
+            page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+            page.wait_for_timeout(200)
+            assert page.locator(".scroll.more").count() == is_cut
+            widths = "part => part.scrollWidth - part.clientWidth"
+            beyond = page.locator("pre").evaluate_all(f"parts => parts.map({widths})")
+            assert not is_cut or max(beyond) <= 1
+
+
+def test_the_legend_of_the_chart_stands_beneath_it_on_any_screen(of_one_test):
+    for width in (1200, 400):
+        with opened(of_one_test, width) as page:
+            assert page.locator("#chart label", has_text="material + discrepancy").first.is_visible()
+            assert page.locator(".chart-dashes").is_visible()
+            assert not page.locator("#chart label", has_text="unloading").is_visible()
+
+
 def test_axe_finds_a_fault_that_is_planted(of_one_test):
     with opened(of_one_test, bypass_csp=True) as page:
         page.evaluate("document.querySelector('img').removeAttribute('alt')")

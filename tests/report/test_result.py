@@ -142,6 +142,8 @@ def test_the_page_begins_with_the_answer_and_escapes_what_it_is_given(tmp_path):
     unfolded = re.sub(r"<details.*?</details>", "", body, flags=re.DOTALL)
     assert unfolded.count('class="warning ') == 3
     assert "Further warnings and notes: 2" in body
+    assert unfolded.count('<strong class="kind">First warning</strong>') == 1
+    assert unfolded.count('<strong class="kind">Warning</strong>') == 2
 
 
 def test_the_record_of_a_folder_is_that_of_the_result(tmp_path):

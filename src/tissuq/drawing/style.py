@@ -38,7 +38,7 @@ MARKERS = "osD^vP*"
 """Marks of things side by side."""
 COLUMN, PAGE = 89 / 25.4, 183 / 25.4
 """Widths of a column and of a page of a journal, inches."""
-ANSWER_WIDTH = 5.0
+ANSWER_WIDTH = 4.6
 """Width of a figure beside the answer of a page, whose letters can be read on a screen of 400 px; inches."""
 BASE_SIZE = 10
 """Size of letters, in points, to which widths of lines and sizes of marks are given."""

@@ -12,7 +12,7 @@ from tissuq.drawing.panels import columns_of, legend_above, on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
 from tissuq.pictures.curves import points_along, ways_of
 from tissuq.report.inputs import inputs_of
-from tissuq.report.measured import computed_section, data_section, subject_of
+from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import in_unit_of, known_number, significant, with_named_units
 from tissuq.report.writer import data_file, posterior_files
@@ -27,6 +27,8 @@ MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
 SIGNIFICANT_ERRORS = 2.0
 """Standard errors of a difference of elpd beyond which it counts."""
+FEW_LAWS = 3
+"""Laws that a title names."""
 DECIDED = 0.95
 """Probability of a law from which the data tell it from the others."""
 MODULUS = ("modulus", "modulus_low", "modulus_high")
@@ -71,7 +73,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     headers = [HEADERS[0], f"modulus [{unit.name}]", *HEADERS[2:]]
     return Result(
         command=f"fit{inputs.options}",
-        title=f"{study.experiment.name}: which law",
+        title=f"{named(study.experiment)}: which law of {_laws_in_words(list(study.comparison.fits))}",
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
@@ -87,6 +89,10 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         recipe=inputs.recipe,
         without=inputs.without,
     )  # fmt: skip
+
+
+def _laws_in_words(names: list[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) <= FEW_LAWS else f"{len(names)}"
 
 
 def _numbers(study: LawStudy) -> tuple[Number, ...]:

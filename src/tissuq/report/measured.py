@@ -15,14 +15,32 @@ if TYPE_CHECKING:
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["computed_section", "data_section", "errors_in_words", "noise_in_words", "subject_of", "tests_in_words"]
+__all__ = [
+    "computed_section",
+    "data_section",
+    "errors_in_words",
+    "named",
+    "noise_in_words",
+    "subject_of",
+    "tests_in_words",
+]
 
+LONGEST_NAME = 40
+"""Letters of the names of several tests in a title; of more these are counted."""
 PRIORS = (
     "Default priors are uniform and wide: boxes ten times as large as a least-squares fit requires (for the material's "
     "parameters: least squares with the material alone), random errors up to the largest stress. Amplitudes of "
     "energies are half-Cauchy, with the typical C10 of the data as their scale; such a posterior may have no mean or "
     "sd, so none is given."
 )
+
+
+def named(experiment: Experiment) -> str:
+    """Return what a title calls what was measured: the test with its specimen, or how many tests of what."""
+    specimens = list(dict.fromkeys(test.specimen for test in experiment.tests if test.specimen))
+    count = len(experiment.tests)
+    name = experiment.name if count == 1 or len(experiment.name) <= LONGEST_NAME else f"{count} tests"
+    return f"{name}, specimen {specimens[0]}" if len(specimens) == 1 and specimens[0] not in name else name
 
 
 def subject_of(experiment: Experiment) -> str:

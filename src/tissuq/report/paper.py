@@ -50,7 +50,7 @@ PAGES = {
 """Title of each group, and what it shows."""
 FIGURE_7 = (
     "Figure 7 (numbered as in the paper). Marginal posteriors of C10: density (each to its own scale), 95 % HPD (bar) "
-    "and mean (dot). Blue: the interval holds the true value; grey: it does not."
+    "and median (dot). Blue: the interval holds the true value; grey: it does not."
 )
 NOTE = (
     "The log evidence is that of the data in MPa with respect to the normalised priors, uniform densities "

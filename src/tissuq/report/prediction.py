@@ -18,6 +18,7 @@ from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
 from tissuq.prediction.bands import Band
+from tissuq.report.measured import named
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.stability import SAME_STATES
@@ -108,7 +109,7 @@ def prediction_result(
     run = Path(settings.run).name or settings.run
     return Result(
         command=f"predict{f' --user-law {law}' if law else ''}",
-        title=f"Predicted stress: {prediction.mode.name}",
+        title=f"Predicted stress: {prediction.mode.name}, by {model.material.name} fitted to {named(model.experiment)}",
         subject=f"run {run}: {model.material.name}, discrepancy {model.discrepancy.name}, fitted to {measured}",
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
         finding=_lead(prediction),

@@ -15,7 +15,7 @@ from tissuq.report.chart import chart_data
 from tissuq.report.figures import answer_figure, described_curves, marginal_figure, predictive_figure
 from tissuq.report.held_out import held_out_files, held_out_table
 from tissuq.report.inputs import inputs_of
-from tissuq.report.measured import computed_section, data_section, subject_of
+from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.methods import methods_section
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import ASSESSMENT
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["specimen_answer", "specimen_result"]
 
-MARGINALS = "Marginal posteriors of {name}: density (each to its own scale), 95 % HPD (bar) and mean (dot)."
+MARGINALS = "Marginal posteriors of {name}: density (each to its own scale), 95 % HPD (bar) and median (dot)."
 CHECKS = (
     "A good predictive check (many measurements inside the band) says nothing about the parameter: a flexible "
     "discrepancy passes it even if it has absorbed part of the stiffness. Where the band of the material alone misses "
@@ -60,7 +60,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
     along_axes = f" {answer.sheet.in_words(unit)}" if answer.sheet else ""
     return Result(
         command="fit",
-        title=f"{study.experiment.name}: {study.settings.material} with the discrepancy '{study.main}'",
+        title=f"{named(study.experiment)}: {study.settings.material} with the discrepancy '{study.main}'",
         subject=subject_of(study.experiment),
         numbers=tuple(
             Number(name, mean / unit.to_mpa, low / unit.to_mpa, high / unit.to_mpa, unit.name)
