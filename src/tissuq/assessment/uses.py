@@ -110,7 +110,8 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
-        common = SPREAD if model.tolerances.estimand == TISSUE else "assumed error of the stress as a whole"
+        error = f"assumed error of the stress as a whole (tolerance 'stress': {model.common_error:.0%})"
+        common = SPREAD if model.tolerances.estimand == TISSUE else error
         return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width
 
