@@ -213,3 +213,9 @@ def test_a_problem_stands_above_the_answer(capsys):
     out = capsys.readouterr().out
     assert out.index("warning 0") < out.index("81.3 kPa")
     assert "Report" not in out
+
+
+@pytest.mark.parametrize(("verdict", "classes"), [(Verdict.NO, "first doubtful"), (Verdict.CARE, "first")])
+def test_a_number_that_is_not_to_be_reported_does_not_stand_out(verdict, classes, tmp_path):
+    write_result(result_of(uses=(Use("report it", verdict, "known to ± 90 %"),)), tmp_path, figures=False)
+    assert f'<p class="{classes}">' in (tmp_path / "report.html").read_text(encoding="utf-8")
