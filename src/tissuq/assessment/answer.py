@@ -64,7 +64,7 @@ class Answer:
     @property
     def meaning_in_words(self) -> str:
         """What numbers and intervals are, in a sentence."""
-        return f"The numbers are posterior means; the intervals are of {self.meaning}."
+        return f"Posterior means, with intervals of {self.meaning}."
 
     def __str__(self) -> str:
         """Return the answer as lines, in its unit, with what to do next as typed in Python."""
