@@ -168,6 +168,7 @@ def in_shear_and_tension(times):
     return [tension, shear]
 
 
+@pytest.mark.slow
 def test_tests_that_no_spread_between_them_explains_give_no_modulus():
     posterior = tq.fit(in_shear_and_tension(4.0))
     (warning,) = (warning for warning in posterior.warnings if warning.code == "tests-apart")
@@ -176,6 +177,7 @@ def test_tests_that_no_spread_between_them_explains_give_no_modulus():
     assert verdicts(posterior)[0] == Verdict.NO
 
 
+@pytest.mark.slow
 def test_two_directions_of_one_specimen_that_differ_by_a_factor_give_no_modulus():
     """They tell a spread between tests that would explain it, which tests of one specimen do not have."""
     stretch = np.linspace(1.02, 1.3, 15)
@@ -203,11 +205,13 @@ def test_of_a_cycle_whose_residuals_are_correlated_one_branch_is_advised():
     assert "--noise autoregressive" in advice["branch"]
 
 
+@pytest.mark.slow
 def test_tests_that_differ_as_specimens_do_are_not_said_to_contradict_each_other():
     codes = {warning.code for warning in tq.fit(in_shear_and_tension(1.2)).warnings}
     assert not codes & {"tests-apart", "contradicting-tests"}
 
 
+@pytest.mark.slow
 def test_a_prior_that_outweighs_the_data_is_said_and_the_modulus_reported_with_care():
     data = tq.simulate("neo-hookean", {"C10": 3e-3}, np.linspace(0.8, 1.3, 21), noise_sd=3e-5, seed=1)
     for centre in (1e-3, 3e-3):

@@ -45,6 +45,7 @@ def c10(folder: Path) -> tuple[float, float]:
     return rows["C10"]["mean"], rows["C10"]["sd"]
 
 
+@pytest.mark.slow
 def test_where_no_parameters_fit_units_and_priors_come_before_anything_else(cli, here, words):
     forces(here)
     said = cli(*words, "--prior", "C10=uniform(0.01,0.02)")

@@ -131,6 +131,7 @@ def test_a_log_normal_prior_of_a_modulus_is_integrated_beside_the_others():
     assert posterior.model.nonlinear == ("C10", "S")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terms", [1, 2])
 def test_designs_are_reduced_at_once_as_one_by_one(terms):
     found = model(OGDEN[f"ogden-{terms}"], noise="unknown")
@@ -146,6 +147,7 @@ def test_designs_are_reduced_at_once_as_one_by_one(terms):
             np.testing.assert_allclose(getattr(reduction, name), values, rtol=1e-9, atol=1e-12, err_msg=name)
 
 
+@pytest.mark.slow
 def test_of_models_with_several_noises_one_is_checked_for_missed_mass(monkeypatch):
     looked: list[int] = []
     monkeypatch.setattr(adaptive_cells, "has_missed", lambda *_: bool(looked.append(1)))

@@ -340,6 +340,7 @@ def test_a_new_patient_under_an_energy_is_predicted_in_every_mode():
         found.new_patient([[1.1, 1.1]], mode="biaxial")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [0.1, 0.25])
 def test_errors_of_the_specimens_tests_are_no_spread_between_them(error):
     """Well measured but for a share of the stress as a whole, against a sum over m and tau for Gaussians."""
@@ -405,6 +406,7 @@ def test_a_new_patient_is_a_posterior_that_is_saved_predicts_and_becomes_materia
     assert "log_likelihood" not in loaded.data.children  # of other specimens' measurements
 
 
+@pytest.mark.slow
 def test_copies_and_a_specimen_in_another_unit_are_told():
     specimens = specimens_of(MODULI)
     first, second, third, *_ = specimens
