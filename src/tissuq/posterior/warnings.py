@@ -14,7 +14,6 @@ from tissuq.assessment.measurements import labels_of_tests
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
-from tissuq.experiments.curve import Curve
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ScaleError, TestError
@@ -166,19 +165,13 @@ def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning
             discrepancy="auto",
         )
     text = f"{finding}: the errors of consecutive measurements are not independent, and the intervals are too narrow. "
-    if any(map(_turns_back, model.experiment.curves)):
+    if any(curve.is_back.any() for curve in model.experiment.curves):
         return ResultWarning(text + "Fit one branch of the cycle ({branch}).", "correlated-residuals", branch="loading")
     if model.noise.is_consecutive:
         return ResultWarning(text + "Fit with fewer points.", "correlated-residuals")
     return ResultWarning(
         text + "Fit with {noise}, or with fewer points.", "correlated-residuals", noise="autoregressive"
     )
-
-
-def _turns_back(curve: Curve) -> bool:
-    """Return whether a test goes back over more than half of its way."""
-    way = curve.abscissa - curve.abscissa[0]
-    return bool(len(way) and np.abs(way).max() - np.abs(way[-1]) > np.ptp(way) / 2)
 
 
 def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
