@@ -51,6 +51,7 @@ def test_where_no_parameters_fit_units_and_priors_come_before_anything_else(cli,
     said = cli(*words, "--prior", "C10=uniform(0.01,0.02)")
     assert said.status == 0, said.err
     assert "Next: check units and signs of data and model (--unit, --factor), and the priors" in said.out
+    assert "Not to be used: no parameters that the priors allow give the measurements" in " ".join(said.out.split())
 
 
 @pytest.mark.slow

@@ -278,6 +278,29 @@ def test_measurements_that_no_parameters_give_are_told():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.02, "unknown"])
+def test_where_no_parameters_fit_the_nearest_run_is_named_and_no_shift_of_means(noise):
+    """A force that falls with the depth, which within its range no parameters of the model do."""
+    data = 2.0 - 5.0 * DEPTH + 0.02 * np.random.default_rng(3).standard_normal(len(DEPTH))
+    found = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=noise, runs=20)
+    (text,) = [text for text in found.warnings if "no parameters that the priors allow" in text]
+    points, outputs = found.runs.good
+    off = np.sqrt(((outputs - data) ** 2).mean(axis=1))
+    values = ", ".join(f"{name} {value:.3g}" for name, value in zip(OGDEN, points[off.argmin()], strict=True))
+    assert f"Of 20 runs the nearest ({values}) is off by {off.min():.3g} (root mean square)" in text
+    assert "emulator's error is large beside the noise" not in " ".join(found.warnings)
+    for marginal in found.marginals.values():
+        assert marginal.hdi()[0] < marginal.mean < marginal.hdi()[1]
+
+
+@pytest.mark.slow
+def test_a_small_error_of_the_model_is_left_to_an_unknown_noise():
+    data = measured(ogden, TRUTH, 0.005) * (1 + 0.05 * np.sin(20 * DEPTH))
+    found = tq.calibrate(DEPTH, data, ogden, OGDEN, runs=16)
+    assert not any("no parameters" in text for text in found.warnings)
+
+
+@pytest.mark.slow
 def test_the_table_of_runs_left_out_has_the_worst_first():
     found = tq.calibrate(DEPTH, measured(ogden, TRUTH, 0.05), ogden, OGDEN, noise_sd=0.05, runs=12)
     table, check = found.leave_one_out, found.check

@@ -175,6 +175,15 @@ def test_the_hpd_of_an_exponential_starts_at_its_bound():
     assert marginal.hdi() == pytest.approx((0, expon.ppf(0.95)), abs=0.02)
 
 
+def test_the_hpd_at_a_bound_holds_its_mean_with_points_of_no_weight_far_off():
+    """Half a table of 1000 bins from there, the whole posterior lay in one of them, and its HPD beside the mean."""
+    points = 1 - 1e-5 * expon.ppf((np.arange(10_000) + 0.5) / 10_000)
+    marginal = marginal_of_points(np.append(points, [0.0, 0.5]), np.append(np.ones(10_000), [1e-9, 1e-6]), (0.0, 1.0))
+    low, high = marginal.hdi()
+    assert low < marginal.mean < high == pytest.approx(1.0, abs=1e-7)
+    assert low == pytest.approx(1 - 1e-5 * expon.ppf(0.95), abs=2e-6)
+
+
 def test_a_blend_is_the_mixture_of_its_parts():
     parts = [(w, marginal_of_mixture(np.ones(1), np.array([m]), np.array([1.0]))) for w, m in ((0.3, 0.0), (0.7, 2.0))]
     both = marginal_of_mixture(np.array([0.3, 0.7]), np.array([0.0, 2.0]), np.ones(2))

@@ -41,9 +41,11 @@ def test_a_number_is_shown_with_three_significant_digits(value, text):
         (123.4, 567.8, 120, ("123", "568")),
         (0.0, 0.0, 0.0, ("0.000", "0.000")),
         (1e-12, 2e-12, 1e-13, ("1e-12", "2e-12")),
+        (9.9995128, 9.9999999, 1.6e-4, ("9.9995", "10.0000")),
+        (1234567.0, 2345678.0, 3e5, ("1234600", "2345700")),
     ],
 )
-def test_an_interval_is_shown_to_two_digits_of_the_sd(low, high, sd, texts):
+def test_an_interval_is_shown_to_two_digits_of_the_sd_and_five_at_most(low, high, sd, texts):
     assert interval(low, high, sd) == texts
 
 

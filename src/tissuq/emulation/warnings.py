@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import EmulatorCheck
+from tissuq.experiments.smoothing import scatter
 
 if TYPE_CHECKING:
     from tissuq.emulation.likelihood import Likelihood
@@ -17,12 +19,16 @@ if TYPE_CHECKING:
 
 __all__ = ["NO_PARAMETERS_FIT", "calibration_warnings"]
 
+FloatArray = NDArray[np.float64]
+
 NO_PARAMETERS_FIT = "no parameters that the priors allow give the measurements"
 """Start of the warning that something other than the parameters is wrong."""
 MIN_EMULATOR_SHARE = 0.1
 """Share of a posterior variance due to the emulator from which a warning is given."""
 MAX_MEAN_SHIFT = 0.5
 """Largest shift of a mean by the emulator's error without a warning, in posterior standard deviations."""
+MAX_SHIFT_IN_SDS = 10
+"""Larger shifts are told as more than that: beside a posterior at a bound, which is as narrow as one likes."""
 MAX_RMS_STANDARDISED = 1.5
 """Largest root mean square of the standardised errors of an emulator that is not over-confident."""
 EDGE_WIDTH, MAX_EDGE_PROBABILITY = 0.01, 0.02
@@ -32,6 +38,9 @@ MIN_MISFIT_PROBABILITY = 1e-4
 """Probability of a misfit as large as that of the best parameters below which no parameters give the data."""
 MAX_SHARE_OUT_OF_REACH = 0.5
 """Largest share of the measurements beyond all outputs of the runs without a warning."""
+MAX_SCATTERS, MAX_SHARE_OFF = 5.0, 0.1
+"""Scatters about a smooth curve, and share of the measurements, that both lie between these and the nearest prediction
+where an unknown noise stands for a model that cannot give them."""
 MAX_SHARE_NEAR_FAILURES = 0.05
 """Largest share of the posterior nearer to a failed run than to any other without a warning."""
 DRAWS_NEAR_FAILURES = 400
@@ -77,7 +86,8 @@ def calibration_warnings(
     """
     if not posterior.converged:
         yield posterior.verdict
-    yield from _no_parameters_fit(problem, emulator, posterior, likelihood)
+    none_fit = list(_no_parameters_fit(problem, emulator, posterior, likelihood))
+    yield from none_fit
     if emulator.runs.failed.any():
         share = _share_near_failures(emulator, posterior)
         position = (
@@ -87,7 +97,9 @@ def calibration_warnings(
             else "The posterior is not near them."
         )
         yield f"{emulator.runs.failure_summary} {position}"
-    yield from _emulator_warnings(problem, check, posterior, exact, emulator_share)
+    if not none_fit:  # of which there is nothing to be made more accurate
+        yield from _large_error(problem, posterior, exact, emulator_share)
+    yield from _over_confident(check)
     at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
         yield (
@@ -109,38 +121,70 @@ def _no_parameters_fit(
     """Yield a warning where the measurements cannot be what the model gives at any parameters, beyond all errors."""
     from scipy.special import gammaincc
 
-    draws = posterior.thinned(DRAWS_NEAR_FAILURES)
-    misfits = likelihood.misfits(draws)
-    best, size = draws[int(misfits.argmin())], len(problem.measured)
-    outputs = emulator.runs.good[1]
-    is_out = (problem.measured < outputs.min(axis=0)) | (problem.measured > outputs.max(axis=0))
+    draws, measured, size = posterior.thinned(DRAWS_NEAR_FAILURES), problem.measured, len(problem.measured)
+    points, outputs = emulator.runs.good
+    at_draws = likelihood.misfits(draws)
+    others = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
+    misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, others])).min())
+    is_out = (measured < outputs.min(axis=0)) | (measured > outputs.max(axis=0))
     is_absorbed = problem.discrepancy.name == "gp" or None in problem.noise_sd.values()  # by what is unknown
     is_out_of_reach = is_absorbed and is_out.mean() > MAX_SHARE_OUT_OF_REACH
-    if gammaincc(0.5 * size, 0.5 * misfits.min()) > MIN_MISFIT_PROBABILITY and not is_out_of_reach:
+    predicted = likelihood.predictions(draws, discrepancy=False, noise=False)[0]
+    is_noise = _noise_is_misfit(problem, np.vstack([outputs, predicted]))
+    if gammaincc(0.5 * size, 0.5 * misfit) > MIN_MISFIT_PROBABILITY and not is_out_of_reach and not is_noise:
         return
-    values = best[: len(problem.forward_symbols)]
-    predicted = emulator.moments(values[None])[0][0]
-    worst = int(np.argmax(np.abs(problem.measured - predicted) / emulator.basis.scale))
-    named = ", ".join(f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, values, strict=True))
-    misfit = np.sqrt(misfits.min() / size)
-    away = f"{misfit:.1f} standard deviations of noise, discrepancy and emulator away (root mean square; 1 is right)"
-    absorbed = "described by a discrepancy or a noise that takes up the whole difference"
+    scale = np.concatenate([
+        np.full(stop - start, problem.noise_sd[name] or _rms(measured[start:stop]))
+        for name, (start, stop) in problem.quantities.items()
+    ])  # fmt: skip
+    nearest = int(_rms((outputs - measured) / scale).argmin())
+    worst = int(np.argmax(np.abs(outputs[nearest] - measured) / scale))
+    name, (start, stop) = next(each for each in problem.quantities.items() if each[1][0] <= worst < each[1][1])
+    off = _rms(outputs[nearest, start:stop] - measured[start:stop])
+    named = [f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, points[nearest], strict=True)]
+    away = np.sqrt(misfit / size)
     yield (
-        f"{NO_PARAMETERS_FIT}: at the best ({named}) they are {absorbed if misfit < 1 else away}, most at the control "
-        f"{problem.control[worst]:.4g}: measured {problem.measured[worst]:.4g}, model {predicted[worst]:.4g}. "
+        f"{NO_PARAMETERS_FIT}: "
+        + (
+            "a discrepancy or a noise takes up the whole difference. "
+            if away < 1 or is_noise
+            else f"at best they are {away:.1f} standard deviations of noise, discrepancy and emulator away (root mean "
+            "square; 1 is right). "
+        )
+        + f"Of {len(points)} runs the nearest ({', '.join(named)}) is off "
+        f"by {off:.3g}{f' in {name}' if name else ''} (root mean square), most at the control "
+        f"{problem.control[worst]:.4g}: measured {measured[worst]:.4g}, model {outputs[nearest, worst]:.4g}. "
         f"{is_out.sum()} of {size} measurements are "
         "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
         "model (discrepancy gp-pinned)."
     )
 
 
-def _emulator_warnings(
-    problem: Problem,
-    check: EmulatorCheck,
-    posterior: SampledPosterior,
-    exact: SampledPosterior,
-    emulator_share: Mapping[str, float],
+def _rms(values: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt((values**2).mean(axis=-1)))
+
+
+def _noise_is_misfit(problem: Problem, predicted: FloatArray) -> bool:
+    """Return whether an unknown noise stands for a difference that is no noise, of the nearest prediction of (N, n).
+
+    Of a quantity without a discrepancy it is one that is large beside the measurements' scatter about a smooth curve.
+    """
+    if problem.discrepancy.is_correlated:
+        return False
+    for name, (start, stop) in problem.quantities.items():
+        control, measured = problem.control[start:stop], problem.measured[start:stop]
+        scattered = scatter(control, measured)
+        if problem.noise_sd[name] is None and scattered is not None:
+            off = _rms(predicted[:, start:stop] - measured).min()
+            if off > MAX_SCATTERS * scattered and off > MAX_SHARE_OFF * _rms(measured):
+                return True
+    return False
+
+
+def _large_error(
+    problem: Problem, posterior: SampledPosterior, exact: SampledPosterior, emulator_share: Mapping[str, float]
 ) -> Iterator[str]:
+    """Yield a warning where the emulator's error widens or shifts the posterior notably."""
     forward = problem.forward_symbols
     shifts = {
         symbol: abs(exact.marginals[symbol].mean - marginal.mean) / marginal.sd
@@ -155,10 +199,16 @@ def _emulator_warnings(
             f"posterior variance of {largest_share}. {advice}"
         )
     elif shifts[largest_shift] > MAX_MEAN_SHIFT:
+        shift = shifts[largest_shift]
+        many = f"{shift:.1f}" if shift < MAX_SHIFT_IN_SDS else f"more than {MAX_SHIFT_IN_SDS}"
         yield (
-            f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by "
-            f"{shifts[largest_shift]:.1f} standard deviations. {advice}"
+            f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by {many} standard "
+            f"deviations. {advice}"
         )
+
+
+def _over_confident(check: EmulatorCheck) -> Iterator[str]:
+    """Yield a warning where the errors of the emulator are larger than it says."""
     if check.rms_standardised > MAX_RMS_STANDARDISED:
         yield (
             "the emulator is over-confident: runs predicted from the others are off by "

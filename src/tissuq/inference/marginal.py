@@ -35,6 +35,8 @@ FEW_GAUSSIANS = 60
 """Up to which Gaussians that are nearly the same are not merged."""
 QUANTILES_OF_WIDENED = 800
 """Of equal probability, into which a marginal is divided."""
+NEGLIGIBLE = 1e-9
+"""Probability at either end that is left out of the table of weighted points that lie far apart."""
 LOG_BINS = 10_000
 """In which the logarithms of many values are sorted."""
 
@@ -129,6 +131,11 @@ def marginal_of_points(
     weights = weights / weights.sum()
     mean, sd = moments_of_values(weights, points)
     bandwidth = bandwidth or 0.9 * sd * float(weights @ weights) ** 0.2
+    if np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth:  # points far off would leave a narrow posterior few bins
+        order = np.argsort(points)
+        rising = np.cumsum(weights[order])
+        of_weight = order[(rising > NEGLIGIBLE) & (rising - weights[order] < rising[-1] - NEGLIGIBLE)]
+        points, weights = points[of_weight], weights[of_weight]
     low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
     is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
     if not is_cut and sd > bandwidth:

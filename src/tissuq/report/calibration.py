@@ -105,9 +105,13 @@ def _repeated(settings: CalibrationSettings) -> str:
     return shlex.join(["calibrate", *words])
 
 
+def _none_fit(study: CalibrationStudy) -> bool:
+    return any(warning.startswith(NO_PARAMETERS_FIT) for warning in study.warnings)
+
+
 def _next_step(study: CalibrationStudy) -> str:
     calibration = study.calibration
-    if any(warning.startswith(NO_PARAMETERS_FIT) for warning in study.warnings):
+    if _none_fit(study):
         return "check units and signs of data and model (--unit, --factor), and the priors: no parameters fit the data."
     if not calibration.converged:
         return "make the posterior converge: repeat the command with --method nuts --force, or narrower priors."
@@ -229,7 +233,7 @@ def readable_calibration(study: CalibrationStudy) -> list[list[str]]:
     calibration, rows = study.calibration, []
     for symbol, marginal in calibration.marginals.items():
         low, high = marginal.hdi()
-        mean, sd = interval(marginal.mean, marginal.sd, marginal.sd)
+        mean, sd = (interval(number, number, marginal.sd)[0] for number in (marginal.mean, marginal.sd))
         ends = "[{}, {}]".format(*interval(low, high, marginal.sd))
         share = calibration.emulator_share[symbol]
         rows.append([study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
@@ -355,6 +359,8 @@ def _model_run(forward: DeckForward, names: tuple[str, ...], study: CalibrationS
 def _lead(study: CalibrationStudy) -> str:
     """Return the finding in two sentences."""
     calibration = study.calibration
+    if _none_fit(study):
+        return f"Not to be used: {NO_PARAMETERS_FIT}, and the intervals are of those that are least far from them."
     findings = []
     for symbol in calibration.problem.forward_symbols:
         marginal = calibration.marginals[symbol]

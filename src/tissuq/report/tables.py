@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping, Sequence
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ __all__ = [
 
 Row = dict[str, Any]
 
+MAX_DIGITS = 5
+"""Of the ends of an interval: of what is measured, no number is known better."""
 UNIT = "unit"
 """What rows call the unit of their stresses; without it these are in MPa."""
 
@@ -75,12 +77,16 @@ def significant(value: float | None, digits: int = 3) -> str:
 
 
 def interval(low: float, high: float, sd: float) -> tuple[str, str]:
-    """Return the ends of an interval with the decimals that its width supports."""
+    """Return the ends of an interval with the decimals that its width supports, and at most five digits."""
     decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
     if decimals > 8:
         return f"{low:.3g}", f"{high:.3g}"
+    largest = max(abs(low), abs(high))
+    if 0 < largest < inf:
+        decimals = min(decimals, MAX_DIGITS - 1 - floor(log10(largest)))
     low, high = (round(end, decimals) + 0.0 for end in (low, high))  # no minus before a zero
-    return f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+    shown = max(0, decimals)
+    return f"{low:.{shown}f}", f"{high:.{shown}f}"
 
 
 def percent(probability: float | None) -> str:
