@@ -77,19 +77,42 @@ def stresses_at(material: Material, states: States, values: ArrayLike) -> FloatA
     """Return the `engineering_stress` at states (n,) of any paths."""
     values = np.asarray(values, dtype=np.float64)
     rows = np.atleast_2d(values)
-    curves = complex_step_stress(material, states, rows)
-    if curves is None:
-        with _explained(material):
-            curves = _scattered(states, lambda path, points: _curves(material, path)(points, rows))
+    curves = _any_stresses(material, states, rows)
     is_borne = np.isfinite(curves).all(axis=0)
     if not is_borne.all():
         symbols = ", ".join(parameter.symbol for parameter in material.parameters)
         stretch = states.abscissa[~is_borne][0]
+        reason = _why_none(material, states.among(np.flatnonzero(~is_borne)), rows)
         raise ModelError(
             f"material '{material.name}' has no finite stress at a stretch of {stretch:g} with the "
-            f"values of {symbols} that it was given: it has locked, or its energy is too large for a number."
+            f"values of {symbols} that it was given: {reason}."
         )
     return curves if values.ndim == 2 else np.asarray(curves[0])
+
+
+def _any_stresses(material: Material, states: States, rows: FloatArray) -> FloatArray:
+    """Return stresses (m, n) at states (n,) for parameter values (m, k), not finite where there are none."""
+    curves = complex_step_stress(material, states, rows)
+    if curves is None:
+        with _explained(material):
+            curves = _scattered(states, lambda path, points: _curves(material, path)(points, rows))
+    return curves
+
+
+NEARLY_ZERO = 1e-3
+"""In place of a parameter of zero that an energy divides by."""
+
+
+def _why_none(material: Material, states: States, rows: FloatArray) -> str:
+    """Return why there is no stress at states (n,) with the values (m, k), as a sentence ends."""
+    parameters = material.parameters
+    zero = (rows == 0) & [not parameter.is_linear and parameter.dimension != "limit" for parameter in parameters]
+    if zero.any() and np.isfinite(_any_stresses(material, states, np.where(zero, NEARLY_ZERO, rows))).all():
+        named = " and ".join(f"{parameters[column].symbol} = 0" for column in np.flatnonzero(zero.any(axis=0)))
+        return f"its formula divides zero by zero where {named}. Give a small number instead ({NEARLY_ZERO:g})"
+    if any(parameter.dimension == "limit" for parameter in parameters):
+        return "it has locked, or its energy is too large for a number"
+    return "its energy is too large for a number"
 
 
 def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) -> FloatArray:

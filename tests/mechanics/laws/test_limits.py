@@ -131,6 +131,29 @@ def test_a_material_that_has_locked_has_no_stress_and_says_so(name):
 
 
 @pytest.mark.parametrize(
+    ("name", "values", "stretch", "reason"),
+    [
+        ("ogden-1", [1.0, 0.0], 1.1, r"divides zero by zero where alpha1 = 0. Give a small number instead \(0.001\)"),
+        ("ogden-2", [1.0, 1.0, 2.0, 0.0], 1.1, "divides zero by zero where alpha2 = 0"),
+        ("fung", [1.0, 0.0], 1.1, "divides zero by zero where b = 0"),
+        ("ogden-1", [1.0, 40.0], 1e20, "given: its energy is too large for a number"),
+    ],
+)
+def test_a_material_that_cannot_lock_is_not_said_to_have_locked(name, values, stretch, reason):
+    with pytest.raises(tq.ModelError, match=reason) as raised:
+        engineering_stress(material_named(name), Uniaxial(), [stretch], values)
+    assert "locked" not in str(raised.value)
+
+
+def test_an_ogden_term_becomes_henckys_law_as_its_exponent_goes_to_zero():
+    small, limit = (
+        engineering_stress(material_named(name), Uniaxial(), [0.5, 1.1, 2.0], values)
+        for name, values in (("ogden-1", [1.0, 1e-3]), ("hencky", [1.0]))
+    )
+    np.testing.assert_allclose(small, limit, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
     "name",
     ["gent", *(pytest.param(name, marks=pytest.mark.slow) for name in [*LOCKING, "extended-tube"] if name != "gent")],
 )

@@ -63,7 +63,8 @@ class Ogden1(_Ogden):
     """W = 2 mu1/alpha1^2 (l1^alpha1 + l2^alpha1 + l3^alpha1 - 3); initial shear modulus mu1.
 
     Written mu/alpha (...) elsewhere, mu is 2 mu1/alpha1 (ANSYS, LS-DYNA); written c/m^2 (...), c is 2 mu1 (FEBio).
-    alpha1 = 2 is neo-Hookean with mu1 = 2 C10.
+    alpha1 = 2 is neo-Hookean with mu1 = 2 C10. As alpha1 goes to zero, where the formula has no value, the law becomes
+    Hencky's, with mu = mu1.
 
     The default prior of alpha1 is uniform from 0.5 to 40. Uniaxial tension alone can hardly tell an exponent a from
     about -2 a, which would be a second mode, so the sign is settled beforehand: for brain, say uniform(-40, -0.5).
