@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import tissuq as tq
+from tissuq.next_test.ranking import TIED, _with_ties
 
 STRETCH = np.linspace(0.8, 1.3, 12)
 NOISE = 0.02
@@ -31,6 +33,17 @@ def test_tests_are_ranked_for_every_target_with_the_data_again(posterior):
     assert far["beyond"] == pytest.approx(2 / 3)
     assert far["note"] == "67% beyond the data"
     assert (table["stable"] == 1).all()
+
+
+def test_what_is_not_told_apart_from_the_best_is_marked():
+    """By hand: of two standard errors of a difference, or less than what is shown, and never a repeat of the data."""
+    rows = [("a", 0.300, 0.004, False), ("b", 0.295, 0.003, False), ("again", 0.294, 0.0, True),
+            ("c", 0.291, 0.003, False), ("d", 0.285, 0.003, False), ("e", np.nan, np.nan, False)]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["candidate", "reduction", "error", "is_repeat"]).assign(target="C10", note="n")
+    exact = table[:3].assign(target="planar:1.1", error=0.0, reduction=[0.2, 0.19999, 0.1])
+    found = _with_ties(pd.concat([table, exact], ignore_index=True))
+    assert found["candidate"][found["is_tied"]].tolist() == ["a", "b", "c", "a", "b"]
+    assert found["note"].tolist() == ["n", f"{TIED}; n", "n", f"{TIED}; n", "n", "n", "n", f"{TIED}; n", "n"]
 
 
 def test_the_usual_tests_are_ranked_where_none_is_given(posterior):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.next_test.candidates import target_named
-from tissuq.report.design import design_figure, design_result, heading, readable_design
+from tissuq.report.design import _best, design_figure, design_result, heading, readable_design
 from tissuq.report.writer import write_result
 from tissuq.studies.design import DesignSettings, DesignStudy
 
@@ -36,6 +37,16 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     assert heading(study, first).endswith("kPa now")
     assert "kPa" not in heading(study, second)
     assert rows[-1][1:3] == ["", ""]
+
+
+def test_tests_that_are_not_told_apart_from_the_best_are_named_with_it(study):
+    new = ~study.table["is_repeat"] & (study.table["target"] == "modulus")
+    names = study.table["candidate"][new].tolist()
+    for count, words in ((0, ""), (2, f" (not told apart from the best: {names[1]})"),
+                         (5, f" (not told apart from the best: {names[1]}, {names[2]} and 2 more)")):  # fmt: skip
+        is_tied = new & (new.cumsum() <= count)
+        number = _best(replace(study, table=study.table.assign(is_tied=is_tied)), study.targets[0])
+        assert f"%{words}; repeating the data" in number.remark
 
 
 @pytest.mark.slow

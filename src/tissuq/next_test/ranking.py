@@ -28,6 +28,9 @@ __all__ = ["rank_tests"]
 
 MAX_MEASURED_REACH = 1 + 1e-6
 """Largest reach of a stretch whose invariants were measured."""
+TOLD_APART, SHOWN = 2.0, 5e-4
+"""Standard errors of the difference of two reductions from which it is one, and what no table shows of them."""
+TIED = "not told apart from the best"
 FEW_COMPONENTS = "inaccurate: few components of the posterior would remain"
 
 
@@ -70,6 +73,8 @@ def rank_tests(
         - reduction: 1 - sd_after / sd_now; error: its standard error by simulation, zero in closed form.
         - beyond: share of the measurements at which I1 or I2 is larger than in the data.
         - stable: probability that the material is stable over the range; nan where that is unknown.
+        - is_tied: whether its reduction is that of the best new test within two standard errors of the simulation, or
+          within what tables show (0.05 %).
         - is_repeat: whether it repeats a test of the data; is_rough: whether few components of the posterior would
           remain, so that the numbers are unreliable; note: all this in words, or why there are no numbers.
 
@@ -102,7 +107,21 @@ def rank_tests(
     table = pd.DataFrame(rows)
     order = {target.name: position for position, target in enumerate(targets_asked)}
     keys = pd.DataFrame({"target": table["target"].map(order), "gain": -table["reduction"]})
-    return table.loc[keys.sort_values(["target", "gain"], kind="stable").index].reset_index(drop=True)
+    ranked_table = table.loc[keys.sort_values(["target", "gain"], kind="stable").index].reset_index(drop=True)
+    return _with_ties(ranked_table)
+
+
+def _with_ties(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a ranking, best first, in which new tests that are not told apart from the best of a target say so."""
+    table.insert(list(table.columns).index("is_repeat"), "is_tied", False)
+    for _, own in table[~table["is_repeat"]].groupby("target"):
+        best = own.iloc[0]
+        margin = np.maximum(TOLD_APART * np.hypot(own["error"], best["error"]), SHOWN)
+        tied = own.index[(best["reduction"] - own["reduction"] <= margin) & (own.index != best.name)]
+        if len(tied):
+            table.loc[[best.name, *tied], "is_tied"] = True
+            table.loc[tied, "note"] = [f"{TIED}; {note}" if note else TIED for note in table.loc[tied, "note"]]
+    return table
 
 
 def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_requested: bool) -> list[dict[str, Any]]:

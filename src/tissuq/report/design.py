@@ -11,6 +11,7 @@ import numpy as np
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.candidates import Target
+from tissuq.next_test.ranking import TIED
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import Row, significant
 from tissuq.studies.design import DesignSettings, DesignStudy
@@ -28,6 +29,8 @@ MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
 MAX_TARGETS = 2
 """Targets in the answer; the finding and the tables have all."""
+FEW_TIES = 2
+"""Tests that are named as not told apart from the best; of others their number."""
 FEW_ROWS, WIDTH = 6, 9.5
 """Number of tests in the figure beside the answer, and width of that of all, inches."""
 CAPTION = (
@@ -177,7 +180,7 @@ def _best(study: DesignStudy, target: Target) -> Number | None:
     if not len(best):
         return None
     row = best.iloc[0]
-    remark = f"lowers its sd by {row['reduction']:.0%}"
+    remark = f"lowers its sd by {row['reduction']:.0%}{_tied(best)}"
     if len(again):
         remark += f"; repeating the data, by {again.iloc[-1]['reduction']:.0%}"
     return Number(f"For {target.title(study.posterior.model)}:", str(row["candidate"]), remark=remark)
@@ -192,12 +195,21 @@ def _sentences(study: DesignStudy) -> list[str]:
             continue
         row = best.iloc[0]
         title = _capitalised(target.title(study.posterior.model))
-        words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}"
+        words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}{_tied(best)}"
         if len(again):
             repeat = again.iloc[-1]
             words += f"; {repeat['candidate']}, by {repeat['reduction']:.0%}"
         sentences.append(words + ".")
     return sentences
+
+
+def _tied(best: pd.DataFrame) -> str:
+    """Return which new tests are not told apart from the best, the first, as a clause; nothing where there are none."""
+    names = [str(name) for name in best["candidate"][best["is_tied"]][1:]]
+    if not names:
+        return ""
+    more = f" and {len(names) - FEW_TIES} more" * (len(names) > FEW_TIES)
+    return f" ({TIED}: {', '.join(names[:FEW_TIES])}{more})"
 
 
 def _capitalised(text: str) -> str:
