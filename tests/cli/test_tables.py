@@ -10,7 +10,19 @@ def test_no_cell_of_a_wide_table_is_cut_short_in_a_narrow_terminal(capsys, monke
     print_rows("A title", [f"heading {number}" for number in range(13)], [cells])
     said = capsys.readouterr().out
     assert "…" not in said
-    assert cells in [line.split() for line in said.splitlines()]
+    assert max(len(line.rstrip()) for line in said.splitlines()) <= 96
+    found = [line.split() for line in said.splitlines() if line.strip().startswith("mooney-rivlin")]
+    assert len(found) > 1
+    assert [cell for line in found for cell in line[1:]] == cells[1:]  # beneath one another, each with its name
+
+
+def test_cells_of_prose_are_wrapped(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    prose = " ".join(f"word{number}" for number in range(60))
+    print_rows("A title", ["claim", "of 2", "numbers"], [["a claim of " + "many " * 15, "2 of 2", prose]])
+    said = capsys.readouterr().out
+    assert max(len(line.rstrip()) for line in said.splitlines()) <= 96
+    assert all(word in said.split() for word in prose.split())
 
 
 def test_a_title_stands_above_a_table_whose_numbers_end_in_one_column(capsys):

@@ -15,31 +15,51 @@ from tissuq.result_warning import Severity, in_shell
 __all__ = ["print_explanations", "print_result", "print_rows", "print_warnings"]
 
 TEXT_WIDTH = 96
-"""Letters in a line of prose."""
+"""Letters in a line of prose, and at least in one of a table."""
+GAP = 2
+"""Letters between columns."""
+PROSE = 40
+"""Letters of a cell from which it is prose, and how many of them a line has at least."""
 
 
 def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table whose first column is text and whose others are numbers."""
+    """Print a table whose first column is text and whose others are numbers, in lines as wide as the terminal.
+
+    Cells of prose are wrapped. Columns that do not fit beside one another stand beneath, each time with the first one.
+    """
     from rich.box import SIMPLE_HEAD
+    from rich.cells import cell_len
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    for index, header in enumerate(headers):
-        table.add_column(header, justify="right" if index else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*map(str, row))
     console = Console(markup=False, emoji=False)  # names may hold brackets and colons
-    needed = console.measure(table, options=console.options.update(max_width=1000)).maximum
-    console.width = max(console.width, needed)  # truncated numbers would mislead
-    console.print(table)
+    available = max(console.width, TEXT_WIDTH)
+    longest = [max(map(cell_len, map(str, cells))) for cells in zip(headers, *rows, strict=True)]
+    is_prose = [length > PROSE for length in longest]
+    least = [PROSE if prose else length for length, prose in zip(longest, is_prose, strict=True)]
+    for number, columns in enumerate(_side_by_side(least, available)):
+        table = Table(title=title * (not number), title_justify="left", title_style="bold", box=SIMPLE_HEAD,
+                      padding=(0, 1, 0, 0), pad_edge=False)  # fmt: skip
+        for index in columns:
+            justify: Any = "right" if index and not is_prose[index] else "left"
+            table.add_column(headers[index], justify=justify, no_wrap=not is_prose[index])
+        for row in rows:
+            table.add_row(*(str(row[index]) for index in columns))
+        needed = sum(least[index] + GAP for index in columns)
+        console.width = max(available, needed)  # truncated numbers would mislead
+        console.print(table)
+
+
+def _side_by_side(widths: Sequence[int], available: int) -> list[list[int]]:
+    """Return which columns stand beside one another where a line has so many letters; the first one in any case."""
+    blocks, filled = [[0]], widths[0] + GAP
+    for index, width in enumerate(widths[1:], 1):
+        if filled + width + GAP > available and len(blocks[-1]) > 1:
+            blocks.append([0])
+            filled = widths[0] + GAP
+        blocks[-1].append(index)
+        filled += width + GAP
+    return blocks
 
 
 def print_warnings(warnings: Sequence[str]) -> None:
