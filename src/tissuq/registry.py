@@ -58,8 +58,10 @@ def find(base: type[T], kind: str, name: str, error: type[TissuqError]) -> type[
         return known[name]
     for plugin in plugins(base, str(name)):
         return plugin
-    close = get_close_matches(str(name).lower(), known, n=1)
-    hint = f" Did you mean '{close[0]}'?" if close else ""
+    text = str(name).lower()
+    family = [full for full in known if text and full.startswith(f"{text}-")]
+    close = family or get_close_matches(text, known, n=1)
+    hint = f" Did you mean {' or '.join(map(repr, close))}?" if close else ""
     raise error(f"there is no {kind} named '{name}'.{hint} Choose one of: {', '.join(known)}.")
 
 

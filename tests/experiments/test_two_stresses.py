@@ -237,3 +237,15 @@ def test_a_first_axis_without_a_number_is_read_beside_the_second(tmp_path):
     path.write_text(f"{head},stress_3_MPa,stress\n".replace("stretch_2", "x_2") + "1,1,1,1,1,1,1\n", encoding="utf-8")
     with pytest.raises(InputError, match="stress2=NAME"):
         read_experiment(path, mode="biaxial")
+
+
+def test_an_inspection_says_of_each_axis_what_its_ranges_are(tmp_path):
+    path = tmp_path / "sheet.csv"
+    rows = "".join(f"{1 + k / 20},{k * 3.0},{1 + k / 10},{k * 4.0}\n" for k in range(8))
+    path.write_text(f"stretch,stress_kPa,stretch_2,stress_2_kPa\n{rows}")
+    found = tq.inspect(path, mode="biaxial")
+    assert "axis 1: stretch 1 to 1.35, stress 0 to 21 kPa; axis 2: stretch 1 to 1.7, stress 0 to 28 kPa" in found.line
+    text = " ".join(str(found).split())
+    assert "stretch axis 1: 1 to 1.35; axis 2: 1 to 1.7" in text
+    assert "'stress_2_kPa' is stress of axis 2" in text
+    assert "of engineering stress of" not in text

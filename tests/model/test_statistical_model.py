@@ -140,6 +140,7 @@ def test_unknown_noise_beside_a_free_independent_error_is_said_to_be_confounded(
         ({"method": "hmc"}, "no method 'hmc'"),
         ({"seed": -1}, "whole number"),
         ({"material": "neohooke"}, "Did you mean 'neo-hookean'"),
+        ({"material": "ogden"}, "Did you mean 'ogden-1' or 'ogden-2' or 'ogden-3'"),
         ({"discrepancy": "gauss"}, "no discrepancy named 'gauss'"),
     ],
 )

@@ -36,6 +36,9 @@ __all__ = [
     "with_engineering_stress",
 ]
 
+LONG = "engineering stress of "
+"""How names of several stresses begin; what is said of each of them begins with the axis alone."""
+
 
 def measured_rows(
     table: Table,
@@ -81,7 +84,7 @@ def measured_rows(
         stretch=np.stack(stretches),
         stress=np.stack([load.stress for load in loads]),
         standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
-        labels=labels,
+        labels=tuple(label.removeprefix(LONG) for label in labels),
     )
     for name, value in columns_only(table, options.get("only")).items():
         measured = measured.with_step(f"only rows with '{value}' in column '{name}'")

@@ -55,9 +55,12 @@ class Inspection:
     def line(self) -> str:
         """What was understood, in one line: name, loading mode, rows, stretches and stresses."""
         experiment = self.reading.experiment
-        spans = dict(self._spans())
         name = f"{experiment.name}: {experiment.mode.name} ({self.reading.mode_source})"
-        return f"{name}, {len(self.reading.used)} rows, stretch {spans['stretch']}, stress {spans['stress']}"
+        spans = "; ".join(
+            f"{f'{label}: ' * bool(label)}stretch {stretch}, stress {stress}"
+            for label, stretch, stress in self._spans()
+        )
+        return f"{name}, {len(self.reading.used)} rows, {spans}"
 
     @property
     def noise_sd(self) -> float | None:
@@ -98,11 +101,11 @@ class Inspection:
         labels = {name: getattr(self.reading.experiment, name) for name in ("specimen", "direction", "condition")}
         if any(labels.values()):
             yield "test", ", ".join(f"{name} {label}" for name, label in labels.items() if label)
-        spans = dict(self._spans())
+        labels_of_spans, stretches, stresses = zip(*self._spans(), strict=True)
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
-        yield "stretch", f"{spans['stretch']}{again}"
-        yield "stress", f"{spans['stress']} (engineering stress, tension positive)"
+        yield "stretch", f"{'; '.join(labelled(labels_of_spans, stretches))}{again}"
+        yield "stress", f"{'; '.join(labelled(labels_of_spans, stresses))} (engineering stress, tension positive)"
         if used.standard_error.any():
             pairs = zip(used.standard_error, used.stress, strict=True)
             shares = [float(np.sqrt((error**2).mean() / (stress**2).mean())) for error, stress in pairs]
@@ -111,13 +114,13 @@ class Inspection:
         noise = [self._noise(sd, stress) for sd, stress in zip(self.noise_sds, used.stress, strict=True)]
         yield "noise", "; ".join(labelled(used.labels, noise))
 
-    def _spans(self) -> Iterator[tuple[str, str]]:
-        """Yield the ranges of stretches and of stresses in words."""
+    def _spans(self) -> Iterator[tuple[str, str, str]]:
+        """Yield of every stress what it is along, where there are several, and the ranges of stretch and stress."""
         used, unit = self.reading.used, stress_unit(self.reading.experiment.stress_unit)
-        spans = labelled(used.labels, [f"{stretch.min():.6g} to {stretch.max():.6g}" for stretch in used.stretch])
-        yield "stretch", "; ".join(spans)
-        ends = [(stress.min() / unit.to_mpa, stress.max() / unit.to_mpa) for stress in used.stress]
-        yield "stress", "; ".join(labelled(used.labels, [f"{low:.6g} to {high:.6g} {unit.name}" for low, high in ends]))
+        for label, stretch, stress in zip(used.labels, used.stretch, used.stress, strict=True):
+            low, high = stress.min() / unit.to_mpa, stress.max() / unit.to_mpa
+            spans = f"{stretch.min():.6g} to {stretch.max():.6g}", f"{low:.6g} to {high:.6g} {unit.name}"
+            yield label, *spans
 
     def _columns(self) -> Iterator[str]:
         table = self.reading.table
