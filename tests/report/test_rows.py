@@ -3,7 +3,9 @@ from math import nan
 
 import pytest
 
+import tissuq as tq
 from tissuq.experiments.units import StressUnit
+from tissuq.report.measured import named
 from tissuq.report.stability import stability_section
 from tissuq.report.summary import summary_table
 from tissuq.report.tables import interval, significant, write_csv, write_json
@@ -83,3 +85,16 @@ def test_where_stability_is_lost_is_told_from_a_probability_of_5_percent():
     assert stability_section([row]).blocks[1].rows == [
         ["auto", "uniaxial", "0.9 to 1.1", "85%", "0.925 [0.907, 0.932]", ""]
     ]
+
+
+def test_a_title_names_the_test_and_its_specimen():
+    first, second, third = (
+        tq.simulate("neo-hookean", {"C10": 0.4}, [1.1, 1.2, 1.3], 0.01, seed=seed).labelled(
+            name=name, specimen=specimen
+        )
+        for seed, (name, specimen) in enumerate((("tension", "pig 3"), ("pig 3 shear", "pig 3"), ("x" * 40, "pig 4")))
+    )
+    assert named(first) == "tension, specimen pig 3"
+    assert named(second) == "pig 3 shear"
+    assert named(tq.Experiment.of([first, second])) == "tension + pig 3 shear"
+    assert named(tq.Experiment.of([first, third])) == "2 tests"

@@ -53,7 +53,7 @@ HOW_TO_READ = (
     "specimens inform what its data do not determine, so a poorly measured specimen moves towards the population and a "
     "well measured one hardly moves.",
     "**A new specimen**: the median and spread of the population with the uncertainty of both. Use this range for "
-    "someone who has not been measured.",
+    "a specimen that has not been measured.",
     "**Complete pooling** treats all specimens as one. Its interval shrinks with every measurement, however much "
     "specimens differ: it understates the uncertainty and is shown for comparison only.",
     "The specimens' model errors are taken to be independent, unless the discrepancy is shared. An error that all of "
