@@ -256,6 +256,7 @@ def test_a_comparison_has_a_row_for_every_fit_with_its_interval(posterior, plain
 def test_stability_is_drawn_for_every_mode_as_it_is_computed(posterior):
     axis = posterior.plot_stability()
     lines = by_label(axis)
+    assert set(lines.pop("95 %, from where it counts as stable").get_ydata()) == {95.0}
     assert set(lines) == set(posterior.stable_ranges)
     for mode, line in lines.items():
         table = posterior.stability(mode, line.get_xdata())

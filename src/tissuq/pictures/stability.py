@@ -27,7 +27,8 @@ def stability(solution: Solution, drawn: Panels) -> None:
     """Draw the probability that the material is stable from the reference up to every stretch, a line a mode."""
     (axis,) = drawn.axes
     sure = 100 * (1 - MIN_LOSS_PROBABILITY)
-    axis.axhline(sure, color=BASE, lw=0.8 * relative_size(), ls=":", zorder=0.5)
+    axis.axhline(sure, color=BASE, lw=0.8 * relative_size(), ls=":", zorder=0.5,
+                 label=f"{sure:g} %, from where it counts as stable")  # fmt: skip
     lowest = 100.0
     for number, mode in enumerate(curve_modes()):
         found = stability_over(solution, mode, None, POINTS)
