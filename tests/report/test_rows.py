@@ -68,6 +68,8 @@ def test_a_summary_has_columns_for_what_is_known_of_any_of_its_rows():
     assert table.headers[4:] == ["log ev.", "in band", "alone", "stable", "lost at stretch", "R-hat", "ESS"]
     assert table.rows[0][4:] == ["", "97%", "50%", "85%", "0.925 [0.907, 0.932]", "1.001", "812"]
     assert table.rows[1][4:] == ["-12.35", "97%", "50%", "", "", "", ""]
+    stable = sampled | {"lost_at": None, "lost_at_low": None, "lost_at_high": None}
+    assert "lost at stretch" not in summary_table([stable], StressUnit("MPa", 1.0), "title").headers
 
 
 def test_tables_hold_every_digit_and_nothing_where_there_is_no_number(tmp_path):

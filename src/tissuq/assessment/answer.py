@@ -100,7 +100,8 @@ def answer_of(
     """
     model, stiffness = solution.model, modulus(solution)
     uses = uses_of(solution, stiffness, ranges, warnings, inside)
-    headline, law = model.headline, _law_in_words(solution)
+    has_stress_at_rest = any(warning.code == "stress-at-rest" for warning in warnings)  # which is no law's
+    headline, law = model.headline, "" if has_stress_at_rest else _law_in_words(solution)
     return Answer(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
         model.meaning,

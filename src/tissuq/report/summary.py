@@ -17,10 +17,8 @@ HOW_TO_READ = (
     "HPD: 95 %. In band, alone: share of measurements inside the 95 % band with the discrepancy, and inside that of "
     "the material alone.{stability} A good predictive check does not mean that {name} is right."
 )
-HOW_TO_READ_STABILITY = (
-    " Stable: probability of stability over the measured stretches. Lost at stretch: median [95 %] of the draws that "
-    "become unstable. All loading modes: `stability.csv`."
-)
+STABLE = " Stable: probability of stability over the measured stretches; all loading modes: `stability.csv`."
+LOST = " Lost at stretch: median [95 %] of the draws that become unstable."
 
 
 def summary_row(
@@ -114,7 +112,8 @@ def summary_table(rows: list[Row], unit: StressUnit, title: str, main: str = "")
         any(row.get(column) is not None for row in rows) for column in ("contains_truth", "rhat", "stable")
     )
     headers = ["discrepancy", f"{name}, {unit.name}", "sd", "95 % HPD", *["truth"] * has_truth]
-    headers += ["log ev.", "in band", "alone", *["stable", "lost at stretch"] * has_stability]
+    is_lost = has_stability and any(row[STABILITY[1]] is not None for row in rows)
+    headers += ["log ev.", "in band", "alone", *["stable"] * has_stability, *["lost at stretch"] * is_lost]
     headers += ["R-hat", "ESS"] * is_sampled
     cells = []
     for row in rows:
@@ -124,13 +123,13 @@ def summary_table(rows: list[Row], unit: StressUnit, title: str, main: str = "")
         line += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * has_truth
         line.append("" if row["log_evidence"] is None else f"{row['log_evidence']:.2f}")
         line += [f"{row[column]:.0%}" for column in ("predictive_coverage", "predictive_coverage_model_only")]
-        if has_stability:
-            line += [percent(row["stable"]), stretch_in_words(*(row[column] for column in STABILITY[1:]))]
+        line += [percent(row["stable"])] if has_stability else []
+        line += [stretch_in_words(*(row[column] for column in STABILITY[1:]))] if is_lost else []
         if is_sampled:
             for column, digits in (("rhat", 3), ("ess", 0)):
                 line.append("" if row[column] is None else f"{row[column]:.{digits}f}")
         cells.append(line)
-    note = HOW_TO_READ.format(name=name, stability=HOW_TO_READ_STABILITY * has_stability)
+    note = HOW_TO_READ.format(name=name, stability=STABLE * has_stability + LOST * is_lost)
     return Table(headers, cells, title, note=note, main=main)
 
 
