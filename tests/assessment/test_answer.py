@@ -10,7 +10,7 @@ import pytest
 import gallery
 import tissuq as tq
 from tissuq.assessment.answer import Answer, Estimate
-from tissuq.assessment.next_step import Step
+from tissuq.assessment.next_step import Step, _with_options
 from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -115,7 +115,8 @@ def test_what_is_implausible_in_the_measurements_comes_first():
         tq.simulate("yeoh", YEOH, [1.1, 1.3, 1.5], noise_sd=0.05, seed=1), discrepancy="auto", noise_sd=0.05
     )
     assert vague.answer.uses[0].verdict is not Verdict.YES
-    offset = posterior.answer_with([ResultWarning("at stretch 1 the stress is already 4 kPa.", "stress-at-rest")])
+    zero = "at stretch 1 the stress is already 4 kPa, which --load-zero first takes off."
+    offset = posterior.answer_with([ResultWarning(zero, "stress-at-rest")])
     assert offset.uses[0].verdict is Verdict.NO
     assert "stress at rest" in offset.uses[0].reason
     assert offset.uses[1].verdict is Verdict.CARE
@@ -142,7 +143,7 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
 def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
     assert answer.meaning == tq.estimands()["specimen"].description
-    assert "nearly all of it the assumed error of the stress as a whole (tolerance 'stress': " in answer.uses[0].reason
+    assert "nearly all of it the error of load and area that is assumed (sd 7 %, the tol" in answer.uses[0].reason
 
 
 def test_an_answer_prints_itself_in_its_unit():
@@ -258,3 +259,20 @@ def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
     assert answer.uses[1].verdict is Verdict.CARE
     assert "contradict" in answer.uses[1].reason
     assert "contradict" in answer.next_step.shell
+
+
+@pytest.mark.parametrize(
+    ("warning", "options"),
+    [
+        ("to fit one branch of one cycle, give --cycle last --branch loading.", "--cycle last --branch loading"),
+        ("the specimen tore; to leave out what follows give --until-peak.", "--until-peak"),
+        ("to fit one of them, give --branch loading or unloading.", "--branch loading"),
+        ('the zero of the load cell, which --load-zero "0.5 kPa" takes off.', '--load-zero "0.5 kPa"'),
+        ("to leave them out give --leave-out 12:15,18.", "--leave-out 12:15,18"),
+        ("for a zero that is not sure --tolerance zero=0.02.", "--tolerance zero=0.02"),
+    ],
+)
+def test_the_next_step_has_the_options_of_the_warning_on_which_it_rests(warning, options):
+    step = Step("fit again with {options}.", "act on the warning.")
+    assert _with_options(step, ResultWarning(warning)).shell == f"fit again with {options}."
+    assert _with_options(step, ResultWarning("torn.")).shell == step.python

@@ -441,7 +441,7 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert list(far_specimens(population)) == ["soft"]
     (warning,) = _far_specimens(population)
     assert warning.severity == Severity.PROBLEM
-    assert "the modulus of soft is 0.0053 times that of the other specimens" in warning
+    assert "the initial modulus of soft is 0.0053 times that of the other specimens" in warning
     assert _next_step(population).startswith("look at soft first")
     population.posteriors.pop("soft")
     assert "finite elements" in _next_step(population)

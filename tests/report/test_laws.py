@@ -10,8 +10,12 @@ import pandas as pd
 import pytest
 
 import tissuq as tq
-from tissuq.experiments.units import stress_unit
-from tissuq.report.laws import law_lead, recommended_law
+from tissuq.report.laws import law_lead
+from tissuq.studies.laws import LawStudy
+
+
+def law_study(comparison, settings=None):
+    return LawStudy(settings, SimpleNamespace(stress_unit="MPa"), comparison)
 
 
 def test_the_finding_is_said_whether_or_not_a_law_can_be_fitted_alone():
@@ -23,7 +27,7 @@ def test_the_finding_is_said_whether_or_not_a_law_can_be_fitted_alone():
     not_alone = replace(comparison, laws={"neo-hookean": without})
     for name, of_laws in {"alone": comparison, "not alone": not_alone}.items():
         settings = SimpleNamespace(discrepancies=("taylor",))
-        words[name] = law_lead(SimpleNamespace(comparison=of_laws, unit=stress_unit("MPa"), settings=settings))
+        words[name] = law_lead(law_study(of_laws, settings))
     assert "Alone, without discrepancy, neo-hookean comes nearest" in words["alone"]
     assert words["alone"].startswith(words["not alone"])
 
@@ -37,7 +41,7 @@ def test_a_law_that_is_nearly_certain_is_not_called_one_of_those_that_the_data_d
         known = table.assign(probability=[share, 1 - share], elpd_difference=[0.0, 0.1], elpd_difference_error=1.0)
         of_laws = SimpleNamespace(table_in=lambda unit, known=known: known, modulus=laws.modulus, between=laws.between)
         settings = SimpleNamespace(discrepancies=("none",))
-        said[share] = law_lead(SimpleNamespace(comparison=of_laws, unit=stress_unit("MPa"), settings=settings))
+        said[share] = law_lead(law_study(of_laws, settings))
     assert "equally well: the data do not tell these apart" in said[0.6]
     assert "tell these apart" not in said[0.999]
     assert f"that {table.index[0]} is the most probable (99.9 %)" in said[0.999]
@@ -61,4 +65,4 @@ def test_a_law_that_is_rarely_stable_is_not_the_one_to_continue_with_where_anoth
         {"stable": stable, "elpd_difference": elpd_difference, "elpd_difference_error": 1.0},
         ["probable", "second", "third"],
     )
-    assert recommended_law(SimpleNamespace(comparison=SimpleNamespace(table_in=lambda unit: laws))) == name
+    assert law_study(SimpleNamespace(table_in=lambda unit: laws)).recommended == name

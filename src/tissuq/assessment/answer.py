@@ -22,6 +22,9 @@ from tissuq.result_warning import ResultWarning
 
 __all__ = ["Answer", "Estimate", "answer_of"]
 
+NOTABLE_SHARE = 0.05
+"""Of the stress, from which the discrepancy is worth a word."""
+
 
 class Estimate(NamedTuple):
     """A stress parameter: its name, mean and the ends of its 95 % highest-density interval, MPa."""
@@ -64,7 +67,7 @@ class Answer:
     @property
     def meaning_in_words(self) -> str:
         """What numbers and intervals are, in a sentence."""
-        return f"Posterior means, with intervals of {self.meaning}."
+        return f"Numbers are posterior means; intervals hold for {self.meaning}."
 
     def __str__(self) -> str:
         """Return the answer as lines, in its unit, with what to do next as typed in Python."""
@@ -106,7 +109,7 @@ def answer_of(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
         model.meaning,
         uses,
-        next_step(solution, uses, warnings, is_law_wrong=bool(law)),
+        next_step(solution, uses, warnings, is_law_wrong=shares_of_discrepancy(solution)[0][0] > PRECISE),
         model.experiment.stress_unit,
         law,
         sheet_stresses(solution),
@@ -114,19 +117,24 @@ def answer_of(
 
 
 def _law_in_words(solution: Solution) -> str:
-    """Return in words that the law by itself does not describe the measurements; nothing where it does."""
+    """Return in words how far the law by itself is from the measurements; nothing where it describes them."""
     (mean, low, high), _ = shares_of_discrepancy(solution)
-    if not has_energy(solution.model) or mean <= PRECISE:
+    if not has_energy(solution.model) or mean <= NOTABLE_SHARE:
         return ""
     law = solution.model.material.name
+    if mean <= PRECISE:
+        return (
+            f"The discrepancy carries {mean:.0%} of the stress, by which {law} alone is off: use both together, as "
+            "predictions and exports do."
+        )
     if high < 1:
         return (
             f"By itself {law} does not describe the measurements: the discrepancy carries {mean:.0%} of the stress "
             f"(95 % interval {low:.0%} to {high:.0%})."
         )
     return (
-        f"How much of the stress is {law}'s and how much the discrepancy's is not determined ({low:.0%} to {high:.0%} "
-        "is the discrepancy's, which may oppose the law): do not use the parameters without the discrepancy."
+        f"How much of the stress is {law}'s and how much the discrepancy's is not determined, as they may oppose each "
+        "other: use both together, as predictions and exports do."
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from tissuq.assessment.uses import SPREAD, Use, Verdict
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["Step", "next_step"]
+__all__ = ["STEPS", "Step", "next_step"]
 
 
 class Step(NamedTuple):
@@ -25,15 +26,18 @@ STEPS: Mapping[str, Step] = {
         'let the data decide how wrong the material is: fit again with discrepancy="auto".',
     ),
     "problem": Step("act on the first warning: it says what to do.", "act on the first warning: it says what to do."),
-    "measurements": Step(*["act on the warning about the measurements: it says what to do."] * 2),
+    "measurements": Step(
+        "act on the warning about the measurements: fit again with {options}.",
+        "act on the warning about the measurements: it says what to do.",
+    ),
     "slack": Step(
         "count from where load begins: fit again with --preload auto.",
         'count from where load begins: read again with preload="auto".',
     ),
     "fibres": Step(*["fit a law with fibres, which has the preferred direction: tissuq materials lists them."] * 2),
     "zero": Step(
-        "take off what the load cell shows at rest: fit again with --load-zero first, or as the first warning says.",
-        'take off what the load cell shows at rest: fit again with load_zero="first", or as the first warning says.',
+        "take off what the load cell shows at rest: fit again with {options}.",
+        'take off what the load cell shows at rest, as the warning says: read again with load_zero="first".',
     ),
     "few": Step(
         "measure at more stretches, from near rest onward: tissuq design {run} says which.",
@@ -82,6 +86,13 @@ ONLY_IN_DOUBT = {"measurements": Verdict.CARE, "slack": Verdict.CARE, "few-measu
 """Of some, the best verdict on the modulus at which they are the next step."""
 
 
+OPTION = (
+    r'--(?:until-peak|relaxed)|--[a-z-]+ (?:"[^"]+"|auto|last|first|loading|biaxial|planar|[a-z]+=[\d.]*\d|\d[\d:,]*)'
+)
+OPTIONS = re.compile(f"(?:{OPTION})(?: (?:{OPTION}))*")
+"""The options, with their values, that a warning about measurements proposes."""
+
+
 def next_step(
     solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning], *, is_law_wrong: bool = False
 ) -> Step:
@@ -97,7 +108,7 @@ def next_step(
     for warning in warnings:
         is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))
         if warning.severity is Severity.CAUTION and warning.code in STEPS_OF_WARNINGS and is_due:
-            return STEPS[STEPS_OF_WARNINGS[warning.code]]
+            return _with_options(STEPS[STEPS_OF_WARNINGS[warning.code]], warning)
     if not solution.is_of_data:
         return STEPS["export"]
     if solution.is_directed:
@@ -109,3 +120,11 @@ def next_step(
     if others is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]
+
+
+def _with_options(step: Step, warning: ResultWarning) -> Step:
+    """Return a step with the options that a warning proposes first, or without a command where it proposes none."""
+    if "{options}" not in step.shell:
+        return step
+    proposed = OPTIONS.search(warning.shell)
+    return step._replace(shell=step.shell.replace("{options}", proposed[0]) if proposed else step.python)

@@ -18,7 +18,7 @@ from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
 from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
-from tissuq.result_warning import ResultWarning
+from tissuq.result_warning import ResultWarning, Severity
 
 __all__ = ["MIN_OFTEN_STABLE", "MIN_STABLE", "PRECISE", "SPREAD", "Use", "Verdict", "uses_of"]
 
@@ -61,7 +61,7 @@ def uses_of(
     inside: NDArray[np.bool_],
 ) -> tuple[Use, ...]:
     """Return for what a posterior with this initial shear modulus can be used; the others as in `answer_of`."""
-    codes = {warning.code for warning in warnings}
+    codes = {w.code for w in warnings if w.code != "measurements" or w.severity is not Severity.NOTE}
     own_tests = _own_tests(solution, inside, codes)
     other_modes = _other_modes(solution, ranges, codes, own_tests)
     return (
@@ -110,7 +110,7 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
-        error = f"assumed error of the stress as a whole (tolerance 'stress': {model.common_error:.0%})"
+        error = f"error of load and area that is assumed (sd {100 * model.common_error:.0f} %, the tolerance 'stress')"
         common = SPREAD if model.tolerances.estimand == TISSUE else error
         return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width
@@ -153,12 +153,13 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
     if held < MIN_INSIDE * count:
         return Verdict.NO, f"only {counts}"
     names = [curve.name for curve in solution.model.experiment.curves]
-    where = f", least in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
+    where = f", worst in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
     sentence = f"stress {width} on average where it was measured{where}; {counts}"
     for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
                          ("tests-apart", "the tests contradict each other"),
-                         ("contradicting-tests", "the tests contradict each other")):  # fmt: skip
+                         ("contradicting-tests", "the tests contradict each other"),
+                         ("measurements", "see the warning about the measurements")):  # fmt: skip
         if code in codes:
             return _worst(verdict, Verdict.CARE), f"{sentence}, but {reason}"
     return verdict, sentence
@@ -203,7 +204,14 @@ def _other_modes(
     except TissuqError as error:
         return Verdict.NO, str(error)
     verdict = _worst(*(_precision(width)[0] for of_mode in widths.values() for width in of_mode))
-    of_modes = ", ".join(f"{name} stress {_signed_percents(of_mode)}" for name, of_mode in widths.items())
+    is_same = (
+        measured == {"uniaxial"} and "equibiaxial" in widths and len(set(map(_percent, widths["equibiaxial"]))) > 1
+    )
+    explained = " (whose strains are those of uniaxial tension)" if is_same else ""
+    of_modes = ", ".join(
+        f"{name} stress {_signed_percents(of_mode)}{explained if name == 'equibiaxial' else ''}"
+        for name, of_mode in widths.items()
+    )
     origin = "measured" if solution.is_of_data else "stated"
     sentence = f"within the strains that were {origin}: {of_modes}"
     is_one_path = len(measured) == 1 and len(model.experiment.modes[0].controls) == 1
@@ -255,7 +263,7 @@ def _simulating(
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{worst.probability:.0%} of the draws are stable over the measured range"
+    share = f"{worst.probability:.0%} of the plausible materials are stable over the measured range"
     if worst.probability < MIN_STABLE:
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:
@@ -265,5 +273,5 @@ def _simulating(
         return Verdict.NO, f"the stress in other loading modes is not known well enough{also}"
     stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
     if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
-        return Verdict.CARE, f"no better than other loading modes are known; {share}"
+        return Verdict.CARE, f"as uncertain as the other loading modes above; {share}"
     return _worst(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"

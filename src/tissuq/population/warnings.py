@@ -77,8 +77,8 @@ def _far_specimens(population: PopulationDraws) -> Iterator[str]:
     """Yield a problem about each specimen that is far from the others."""
     for name, times in far_specimens(population).items():
         yield ResultWarning(
-            f"the modulus of {name} is {times:.2g} times that of the other specimens, and widens the range of new "
-            "ones: see whether the unit of its stresses, or its area, is right; if it is no such specimen, leave it "
-            f"out (--without {name}).",
+            f"the initial modulus of {name} is {times:.2g} times that of the other specimens, and widens the range of "
+            "new ones: see whether the unit of its stresses and its area are right, and whether it begins slack; if it "
+            f"is no such specimen, leave it out (--without {name}).",
             severity=Severity.PROBLEM,
         )

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.assessment.uses import MIN_OFTEN_STABLE, MIN_STABLE
+from tissuq.assessment.answer import Answer
+from tissuq.assessment.next_step import STEPS
+from tissuq.assessment.uses import MIN_STABLE
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import columns_of, legend_above, on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
@@ -21,12 +23,10 @@ from tissuq.studies.laws import LawStudy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["HEADERS", "law_lead", "law_result", "readable_laws", "recommended_law"]
+__all__ = ["HEADERS", "law_lead", "law_result", "readable_laws"]
 
 MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
-SIGNIFICANT_ERRORS = 2.0
-"""Standard errors of a difference of elpd beyond which it counts."""
 FEW_LAWS = 3
 """Laws that a title names."""
 DECIDED = 0.95
@@ -67,9 +67,8 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % HPD, and the "
         "average by the laws' probabilities."
     )
-    law = recommended_law(study)
+    law = study.recommended
     answer = comparison.fits[law].answer_with(study.data_warnings)
-    is_stable = " and stable" if comparison.table_in("MPa").stable[law] >= MIN_STABLE else ""
     headers = [HEADERS[0], f"modulus [{unit.name}]", *HEADERS[2:]]
     return Result(
         command=f"fit{inputs.options}",
@@ -78,8 +77,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
         uses=tuple(use._replace(purpose=f"{use.purpose}, with {law}") for use in answer.uses),
-        next_step=f"continue with {law}, which is as good as any here{is_stable}: tissuq predict, export or design "
-        f"{{run}} --material {law}",
+        next_step=f"continue with {law}, which is as good as any here: {_next_step_with(law, answer)}",
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",
                       note="Log evidences, intervals of the shares and times are in `laws.csv`."),),
@@ -89,6 +87,12 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         recipe=inputs.recipe,
         without=inputs.without,
     )  # fmt: skip
+
+
+def _next_step_with(law: str, answer: Answer) -> str:
+    """Return what to do next with a law; other laws were tried already."""
+    step = STEPS["design"] if answer.next_step == STEPS["law"] else answer.next_step
+    return step.shell.replace("{run}", f"{{run}} --material {law}")
 
 
 def _laws_in_words(names: list[str]) -> str:
@@ -107,29 +111,11 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
         remark = f"probability {_percent(float(table.probability[law]))}"
         numbers.append(Number("most probable law", law, remark=remark))
     best = str(table.elpd_difference.idxmin())
-    close = _close(study)
+    close = study.close
     as_good = f"{len(close) - 1} other{'s' * (len(close) > 2)} as good" if len(close) > 1 else "no other as good"
     stable = float(table.stable[best])
     but = f"; stable over the measured range with a probability of {_percent(stable)}" if stable < MIN_STABLE else ""
     return (*numbers, Number("best for left-out measurements", best, remark=as_good + but))
-
-
-def recommended_law(study: LawStudy) -> str:
-    """Return the law to continue with.
-
-    Of those that predict left-out measurements as well as the best it is the most probable one that is more often
-    stable than not over the measured range, or the one that most probably is.
-    """
-    table = study.comparison.table_in("MPa").loc[_close(study)]
-    stable = table[~(table.stable < MIN_OFTEN_STABLE)]
-    return str(table.stable.idxmax() if stable.empty else stable.index[0])
-
-
-def _close(study: LawStudy) -> list[str]:
-    """Return the laws that predict left-out measurements as well as the best."""
-    table = study.comparison.table_in("MPa")
-    is_close = table.elpd_difference < SIGNIFICANT_ERRORS * table.elpd_difference_error
-    return [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]
 
 
 def readable_laws(study: LawStudy) -> list[list[str]]:
@@ -159,7 +145,7 @@ def law_lead(study: LawStudy) -> str:
     comparison, unit = study.comparison, study.unit
     table, modulus = comparison.table_in("MPa"), comparison.modulus
     low, high = (significant(end / unit.to_mpa) for end in modulus.hdi())
-    close = _close(study)
+    close = study.close
     told = (
         f"of {len(table)} laws, only {close[0]} describes the measurements so well that no other is as good"
         if len(close) == 1

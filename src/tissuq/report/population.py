@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,7 +107,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
-        next_step=_next_step(population),
+        next_step=_next_step(population, settings.without),
         picture=Picture(
             "answer", lambda: first_parameter_figure(population, unit),
             "The first parameter of every specimen", SPECIMENS,
@@ -124,15 +124,15 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     )  # fmt: skip
 
 
-def _next_step(population: Population) -> str:
+def _next_step(population: Population, already_without: Sequence[str] = ()) -> str:
     """Return what to do next: look at specimens that are far from the others before anything is computed with them."""
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
     if far := list(far_specimens(population)):
-        options = " ".join(f"--without {name}" for name in far)
+        options = " ".join(f"--without {name}" for name in (*already_without, *far))
         return (
-            f"look at {', '.join(far)} first: the unit of the stresses, the area, the columns. Then fit again, or "
-            f"leave {'it' if len(far) == 1 else 'them'} out: {options}"
+            f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
+            f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
     return "take a new specimen into finite elements: tissuq export, structure or ensemble {run}"
 

@@ -54,8 +54,7 @@ EVIDENCE = (
 
 def specimen_answer(study: SpecimenStudy) -> Result:
     """Return the answer of a fit alone, which is there before anything is assessed."""
-    answer, unit, lag = study.answer, study.unit, study.posteriors[study.main].model.fitted_errors.lag
-    correlated = f" The errors of consecutive measurements are correlated (lag-1 correlation {lag:.2f})." if lag else ""
+    answer, unit = study.answer, study.unit
     of_law = f" {answer.law}" if answer.law else ""
     along_axes = f" {answer.sheet.in_words(unit)}" if answer.sheet else ""
     return Result(
@@ -67,7 +66,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
             for name, mean, low, high in answer.estimates
         )
         + _over_discrepancies(study),
-        finding=f"{answer.meaning_in_words}{correlated}{along_axes}{of_law}",
+        finding=f"{answer.meaning_in_words}{along_axes}{of_law}",
         uses=answer.uses,
         next_step=answer.next_step.shell,
         warnings=tuple(study.warnings),

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tissuq.assessment.measurements import measurement_warnings
+from tissuq.assessment.uses import MIN_OFTEN_STABLE
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
@@ -17,13 +18,15 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
-from tissuq.result_warning import ResultWarning, merged, most_severe_first
+from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
 from tissuq.studies.specimen import priors_in_mpa, warnings_of_files
 from tissuq.studies.specimen_settings import LawSettings
 from tissuq.studies.stream import open_pool
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
 
+SIGNIFICANT_ERRORS = 2.0
+"""Standard errors of a difference of elpd beyond which it counts."""
 MIN_DIVIDED = 4
 """Laws from which starting processes takes less time than it saves."""
 
@@ -67,9 +70,33 @@ class LawStudy:
         return [name for name, posterior in self.comparison.fits.items() if posterior.solution.is_approximate]
 
     @property
+    def close(self) -> list[str]:
+        """The laws that predict left-out measurements as well as the best, the most probable first."""
+        table = self.comparison.table_in("MPa")
+        is_close = table.elpd_difference < SIGNIFICANT_ERRORS * table.elpd_difference_error
+        return [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]
+
+    @property
+    def recommended(self) -> str:
+        """The law to continue with.
+
+        Of those that predict left-out measurements as well as the best it is the most probable one that is more often
+        stable than not over the measured range, or the one that most probably is.
+        """
+        table = self.comparison.table_in("MPa").loc[self.close]
+        stable = table[~(table.stable < MIN_OFTEN_STABLE)]
+        return str(table.stable.idxmax() if stable.empty else stable.index[0])
+
+    @property
     def warnings(self) -> list[ResultWarning]:
-        """Warnings about data and fits, each once with the laws that it concerns, the severest first."""
-        texts = merged({name: posterior.warnings for name, posterior in self.comparison.fits.items()})
+        """Warnings about data and fits, each once with the laws that it concerns, the severest first.
+
+        Those of other laws than the recommended one are notes.
+        """
+        fits = self.comparison.fits
+        own = merged({self.recommended: fits[self.recommended].warnings}, named=True)
+        others = merged({name: fit.warnings for name, fit in fits.items() if name != self.recommended}, named=True)
+        texts = [*own, *(text if text.severity is Severity.PROBLEM else text.as_note() for text in others)]
         return most_severe_first([*self.data_warnings, *measurement_warnings(self.experiment), *texts])
 
 

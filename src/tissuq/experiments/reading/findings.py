@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
+from tissuq.experiments.reading.cycles import Cycle
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.load_cell import scatter_of_neighbours
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.units import stress_unit
@@ -130,7 +131,13 @@ def _hysteresis_share(reading: Reading, number: int) -> float:
     if DISTURBED.intersection(region.kind for region in reading.regions[number]):
         return 0.0
     course, stress = reading.used.course, reading.used.stress[number]
-    cycle = reading.used_cycles[-1]
+    share = max(_gap_of_branches(course, stress, cycle) for cycle in reading.used_cycles)
+    share /= max(float(np.abs(stress).max()), np.finfo(float).tiny)
+    return share if share >= NOTABLE_SHARE else 0.0
+
+
+def _gap_of_branches(course: Column, stress: Column, cycle: Cycle) -> float:
+    """Return by how much the stresses of loading and unloading differ in a cycle; zero where none are comparable."""
     branches = [cycle.rows("loading"), cycle.rows("unloading")]
     if min(map(len, branches)) < MIN_ROWS_PER_CYCLE / 2:
         return 0.0
@@ -144,8 +151,7 @@ def _hysteresis_share(reading: Reading, number: int) -> float:
         return 0.0  # tension and compression one after another, of which a jump joins the two
     grid = np.linspace(low, high, 50)
     loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
-    share = float(np.abs(loading - unloading).max() / max(np.abs(stress).max(), np.finfo(float).tiny))
-    return share if share >= NOTABLE_SHARE else 0.0
+    return float(np.abs(loading - unloading).max())
 
 
 def _nearest_to_reference(reading: Reading) -> tuple[NDArray[np.float64], int]:
