@@ -177,3 +177,11 @@ def test_measurements_of_unloading_are_told_from_those_of_loading():
     (test, *_) = chart_data({"none": cyclic}, "none", KPA)["tests"]
     back = [at for at, is_back in zip(test["measured_at"], test["is_back"], strict=True) if is_back]
     assert sorted(back) == pytest.approx(sorted(stretch[6:]), rel=1e-4)
+
+
+def test_the_material_alone_is_shown_where_it_is_determined():
+    """Of three linear parameters beside an energy that may be any of their sums nothing is known of the sum alone."""
+    data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, np.linspace(0.8, 1.6, 16), noise_sd=0.01, seed=1)
+    for material, is_shown in (("yeoh", False), ("neo-hookean", True)):
+        posterior = tq.fit(data, material=material, noise_sd=0.01)
+        assert ("alone" in chart_data({"auto": posterior}, "auto", KPA)["views"][0]) == is_shown

@@ -139,7 +139,7 @@ def _no_parameters_fit(
     ])  # fmt: skip
     nearest = int(_rms((outputs - measured) / scale).argmin())
     worst = int(np.argmax(np.abs(outputs[nearest] - measured) / scale))
-    name, (start, stop) = next(each for each in problem.quantities.items() if each[1][0] <= worst < each[1][1])
+    name, (start, stop) = next(quantity for quantity in problem.quantities.items() if worst in range(*quantity[1]))
     off = _rms(outputs[nearest, start:stop] - measured[start:stop])
     named = [f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, points[nearest], strict=True)]
     away = np.sqrt(misfit / size)

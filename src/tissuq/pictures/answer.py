@@ -13,7 +13,7 @@ from tissuq.drawing.pieces import band, cut_off, line, points
 from tissuq.drawing.style import BAND, BASE, INK, MARKERS, STYLE, TRUTH, inline_svg, new_figure, relative_size
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
-from tissuq.pictures.curves import Described, points_along, share_along, ways_of
+from tissuq.pictures.curves import Described, is_determined, points_along, share_along, ways_of
 from tissuq.prediction.bands import predict_band
 
 if TYPE_CHECKING:
@@ -118,7 +118,8 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
 def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     """Draw the bands of a curve, the material alone and the measurements; of several paths lines for the latter two."""
     curve, percent, is_one = described.curve, f"{100 * described.prob:.4g} %", len(described.ways) == 1
-    material_stress = described.stress_alone if described.has_discrepancy else None
+    has_parts = described.has_discrepancy and is_determined(described.stress_alone, described.stress)
+    material_stress = described.stress_alone if has_parts else None
     measured, error = curve.stress / unit.to_mpa, curve.standard_error / unit.to_mpa
     core = [measured - error, measured + error, described.stress.median / unit.to_mpa]
     limit_values = [

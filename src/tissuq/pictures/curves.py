@@ -18,7 +18,7 @@ from tissuq.inference.threads import one_thread
 from tissuq.prediction.bands import Band, inside_band, predict_bands
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["Described", "Way", "described", "points_along", "share_along", "ways_of"]
+__all__ = ["Described", "Way", "described", "is_determined", "points_along", "share_along", "ways_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -120,6 +120,11 @@ def described(
     curves = solution.model.experiment.curves
     pairs = zip(curves, inside or [None] * len(curves), strict=True)
     return [Described(solution, curve, prob, known) for curve, known in pairs]
+
+
+def is_determined(alone: Band, stress: Band) -> bool:
+    """Return whether the stress of the material alone is known at all: to no less than all stress beside it."""
+    return bool(((alone.high - alone.low) ** 2).mean() / 4 <= (stress.median**2).mean())
 
 
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:

@@ -16,7 +16,7 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
-from tissuq.pictures.curves import Described
+from tissuq.pictures.curves import Described, is_determined
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands
 from tissuq.report.figures import described_curves
@@ -86,9 +86,9 @@ def chart_data(
         ``tests``, one a stress, with x, the measurements, and basis (at every node of the exponent the stress of the
         material per unit of each linear parameter); ``views``, one a formulation and test, with low, median, high (of
         new measurements), stress_low, stress_high (of the stress itself), and alone_low, alone, alone_high (of the
-        material alone, where there is a discrepancy), and the limits of the axis; ``parameters`` with the ranges of
-        sliders, the linear ones first; ``nodes`` of an exponent that has a slider; ``fixed``, the parameters that stay
-        at their medians; and ``unit``.
+        material alone, where there is a discrepancy and it is determined), and the limits of the axis; ``parameters``
+        with the ranges of sliders, the linear ones first; ``nodes`` of an exponent that has a slider; ``fixed``, the
+        parameters that stay at their medians; and ``unit``.
     """
     described = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     posterior = posteriors[main]
@@ -184,7 +184,7 @@ def _columns(bands: _Bands, test: _Test, unit: StressUnit) -> dict[str, Any]:
         "stress_high": bands.stress.high,
     }
     core = [test.measured, bands.measurements.median]
-    if bands.alone is not None:
+    if bands.alone is not None and is_determined(bands.alone, bands.stress):
         columns |= {"alone_low": bands.alone.low, "alone": bands.alone.median, "alone_high": bands.alone.high}
     limits = np.array(limits_of(core, list(columns.values())))
     columns["limits"] = limits
