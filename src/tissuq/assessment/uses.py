@@ -111,7 +111,9 @@ def _reporting(
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
         error = f"error of load and area that is assumed (sd {100 * model.common_error:.0f} %, the tolerance 'stress')"
-        common = SPREAD if model.tolerances.estimand == TISSUE else error
+        unnamed = " (each test without the name of one counts as a specimen)"
+        spread = SPREAD + unnamed * (not all(test.specimen for test in model.experiment.tests))
+        common = spread if model.tolerances.estimand == TISSUE else error
         return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width
 
