@@ -143,7 +143,7 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
 def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
     assert answer.meaning == tq.estimands()["specimen"].description
-    assert "nearly all of it the error of load and area that is assumed (sd 7 %, the tol" in answer.uses[0].reason
+    assert "nearly all of it the assumed error of load and area (tolerance 'stress', 7 %)" in answer.uses[0].reason
 
 
 def test_an_answer_prints_itself_in_its_unit():

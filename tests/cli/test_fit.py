@@ -338,7 +338,7 @@ def test_the_default_interval_of_a_file_is_of_the_specimen_and_says_so(cli, here
         (row,) = summary_of(here / name)
         assert row["estimand"] == name
         meaning = tq.estimands()[name].description
-        assert f"intervals hold for {meaning}." in " ".join(one.out.split())
+        assert f"intervals for {meaning}." in " ".join(one.out.split())
         assert f"Intervals are of {meaning}." in (here / name / "report.html").read_text()
         widths[name] = float(row["C10_hdi_high"]) - float(row["C10_hdi_low"])
     assert widths["as-tested"] < widths["specimen"] < widths["tissue"]

@@ -67,7 +67,7 @@ class Answer:
     @property
     def meaning_in_words(self) -> str:
         """What numbers and intervals are, in a sentence."""
-        return f"Numbers are posterior means; intervals hold for {self.meaning}."
+        return f"Means, and intervals for {self.meaning}."
 
     def __str__(self) -> str:
         """Return the answer as lines, in its unit, with what to do next as typed in Python."""
@@ -123,18 +123,15 @@ def _law_in_words(solution: Solution) -> str:
         return ""
     law = solution.model.material.name
     if mean <= PRECISE:
-        return (
-            f"The discrepancy carries {mean:.0%} of the stress, by which {law} alone is off: use both together, as "
-            "predictions and exports do."
-        )
+        return f"{law} alone is off by {mean:.0%} of the stress: use it with the discrepancy, as exports do."
     if high < 1:
         return (
-            f"By itself {law} does not describe the measurements: the discrepancy carries {mean:.0%} of the stress "
-            f"(95 % interval {low:.0%} to {high:.0%})."
+            f"{law} alone is wrong here: the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to "
+            f"{high:.0%})."
         )
     return (
-        f"How much of the stress is {law}'s and how much the discrepancy's is not determined, as they may oppose each "
-        "other: use both together, as predictions and exports do."
+        f"How much of the stress is {law}'s and how much the discrepancy's is not determined: use both together, as "
+        "exports do."
     )
 
 

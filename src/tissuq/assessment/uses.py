@@ -110,7 +110,7 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
-        error = f"error of load and area that is assumed (sd {100 * model.common_error:.0f} %, the tolerance 'stress')"
+        error = f"assumed error of load and area (tolerance 'stress', {100 * model.common_error:.0f} %)"
         unnamed = " (each test without the name of one counts as a specimen)"
         spread = SPREAD + unnamed * (not all(test.specimen for test in model.experiment.tests))
         common = spread if model.tolerances.estimand == TISSUE else error
@@ -206,10 +206,8 @@ def _other_modes(
     except TissuqError as error:
         return Verdict.NO, str(error)
     verdict = _worst(*(_precision(width)[0] for of_mode in widths.values() for width in of_mode))
-    is_same = (
-        measured == {"uniaxial"} and "equibiaxial" in widths and len(set(map(_percent, widths["equibiaxial"]))) > 1
-    )
-    explained = " (whose strains are those of uniaxial tension)" if is_same else ""
+    is_same = measured == {"uniaxial"} and _differ(widths.get("equibiaxial", [0.0]))
+    explained = " (the strains of uniaxial tension)" if is_same else ""
     of_modes = ", ".join(
         f"{name} stress {_signed_percents(of_mode)}{explained if name == 'equibiaxial' else ''}"
         for name, of_mode in widths.items()
@@ -229,10 +227,16 @@ def _compression_and_tension(stable_range: StableRange) -> list[NDArray[np.float
     return [np.linspace(*pair, GRID_POINTS) for pair in ends]
 
 
+def _differ(widths: Sequence[float]) -> bool:
+    """Return whether half widths of compression and tension are to be said apart."""
+    return max(widths) > SKEW * min(widths) and len(set(map(_percent, widths))) > 1
+
+
 def _signed_percents(widths: Sequence[float]) -> str:
     """Return half widths in words: that of the range, or those of compression and tension where they differ."""
-    if len(texts := list(dict.fromkeys(map(_percent, widths)))) == 1:
-        return texts[0]
+    if not _differ(widths):
+        return _percent(max(widths))
+    texts = list(map(_percent, widths))
     return f"{texts[1]} in tension and {texts[0]} in compression"
 
 
@@ -265,7 +269,7 @@ def _simulating(
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{worst.probability:.0%} of the plausible materials are stable over the measured range"
+    share = f"{worst.probability:.0%} of the plausible materials are stable where measured"
     if worst.probability < MIN_STABLE:
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:

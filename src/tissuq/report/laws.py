@@ -92,6 +92,8 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
 def _next_step_with(law: str, answer: Answer) -> str:
     """Return what to do next with a law; other laws were tried already."""
     step = STEPS["design"] if answer.next_step == STEPS["law"] else answer.next_step
+    if "{run}" not in step.shell:
+        return f"{step.shell} Its posterior: tissuq predict, export or design {{run}} --material {law}"
     return step.shell.replace("{run}", f"{{run}} --material {law}")
 
 

@@ -202,10 +202,8 @@ def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:
     if len(study.posteriors) == 1:
         return ()
     means = {name: study.posteriors[name].marginals[study.headline].mean / study.unit.to_mpa for name in _uncut(study)}
-    low, high = min(means, key=lambda name: means[name]), max(means, key=lambda name: means[name])
-    ends = f"{significant(means[low])} to {significant(means[high])} {study.unit.name}"
-    name = f"{study.headline}, mean with {len(means)} discrepancies"
-    return (Number(name, ends, remark=f"from '{low}' to '{high}'"),)
+    ends = f"{significant(min(means.values()))} to {significant(max(means.values()))} {study.unit.name}"
+    return (Number(f"{study.headline} with {len(means)} discrepancies", ends),)
 
 
 def _comparison(summary: list[Row], study: SpecimenStudy) -> str:
