@@ -10,14 +10,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.assessment.uses import Use, Verdict
-from tissuq.report.prediction import (
-    band_headers,
-    prediction_figure,
-    prediction_result,
-    readable_bands,
-    readable_scores,
-    score_headers,
-)
+from tissuq.report.prediction import prediction_figure, prediction_result
+from tissuq.report.prediction_tables import band_headers, readable_bands, readable_scores, score_headers
 from tissuq.report.result import Result
 from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted

@@ -132,7 +132,8 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
 
 def predict(request: Mapping[str, Any], say: Say) -> None:
     """Predict another loading mode from a run; say the bands, and write the folder."""
-    from tissuq.report.prediction import band_headers, prediction_result, readable_bands
+    from tissuq.report.prediction import prediction_result
+    from tissuq.report.prediction_tables import band_headers, readable_bands
     from tissuq.report.run_folder import run_folder
     from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell

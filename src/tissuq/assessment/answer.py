@@ -65,9 +65,10 @@ class Answer:
     sheet: SheetStresses | None = None
 
     @property
-    def meaning_in_words(self) -> str:
-        """What numbers and intervals are, in a sentence."""
-        return f"Means, and intervals for {self.meaning}."
+    def sentences(self) -> list[str]:
+        """What numbers and intervals are, and what they do not say of a sheet with a direction and of the law."""
+        along_axes = self.sheet.in_words(stress_unit(self.unit)) if self.sheet else ""
+        return list(filter(None, (f"Means, and intervals for {self.meaning}.", along_axes, self.law)))
 
     def __str__(self) -> str:
         """Return the answer as lines, in its unit, with what to do next as typed in Python."""
@@ -76,9 +77,7 @@ class Answer:
             f"{name} {mean / scale:.3g} {self.unit}, 95 % interval {low / scale:.3g} to {high / scale:.3g}"
             for name, mean, low, high in self.estimates
         ]
-        lines += [self.meaning_in_words]
-        lines += [self.law] if self.law else []
-        lines += [self.sheet.in_words(stress_unit(self.unit))] if self.sheet else []
+        lines += self.sentences
         lines += [f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses]
         return "\n".join([*lines, f"Next: {self.next_step.python}"])
 
@@ -109,7 +108,7 @@ def answer_of(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
         model.meaning,
         uses,
-        next_step(solution, uses, warnings, is_law_wrong=shares_of_discrepancy(solution)[0][0] > PRECISE),
+        next_step(solution, uses, warnings),
         model.experiment.stress_unit,
         law,
         sheet_stresses(solution),

@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from tissuq.assessment.uses import SPREAD, Use, Verdict
+from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -25,7 +26,7 @@ STEPS: Mapping[str, Step] = {
         "let the data decide how wrong the material is: fit again with --discrepancy auto.",
         'let the data decide how wrong the material is: fit again with discrepancy="auto".',
     ),
-    "problem": Step("act on the first warning: it says what to do.", "act on the first warning: it says what to do."),
+    "problem": Step(*["act on the first warning: it says what to do."] * 2),
     "measurements": Step(
         "act on the warning about the measurements: fit again with {options}.",
         "act on the warning about the measurements: it says what to do.",
@@ -43,10 +44,7 @@ STEPS: Mapping[str, Step] = {
         "measure at more stretches, from near rest onward: tissuq design {run} says which.",
         "measure at more stretches, from near rest onward: posterior.design() says which.",
     ),
-    "specimens": Step(
-        "measure further specimens: how much they differ is assumed so far, and sets the width.",
-        "measure further specimens: how much they differ is assumed so far, and sets the width.",
-    ),
+    "specimens": Step(*["measure further specimens: how much they differ is assumed so far, and sets the width."] * 2),
     "law": Step(
         "see whether another law describes the measurements by itself: fit again with --material all.",
         "see whether another law describes the measurements by itself: tq.fit_laws.",
@@ -93,17 +91,14 @@ OPTIONS = re.compile(f"(?:{OPTION})(?: (?:{OPTION}))*")
 """The options, with their values, that a warning about measurements proposes."""
 
 
-def next_step(
-    solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning], *, is_law_wrong: bool = False
-) -> Step:
+def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
     """Return the one thing to do next, the severest of the warnings first."""
     if any(warning.severity is Severity.PROBLEM for warning in warnings):
         return STEPS["problem"]
     reporting, _, others, simulating = (use.verdict for use in uses)
     model, verdicts = solution.model, list(Verdict)
-    has_stress_at_rest = any(warning.code == "stress-at-rest" for warning in warnings)
     is_plain_law = solution.is_of_data and not model.energy_symbols and model.material.is_isotropic
-    if is_plain_law and not has_stress_at_rest:
+    if is_plain_law and all(warning.code != "stress-at-rest" for warning in warnings):
         return STEPS["auto"]
     for warning in warnings:
         is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))
@@ -116,7 +111,8 @@ def next_step(
     if reporting is not Verdict.YES:
         if SPREAD in uses[0].reason:
             return STEPS["specimens"]
-        return STEPS["law" if is_law_wrong and model.material.is_isotropic else "design"]
+        is_law_wrong = model.material.is_isotropic and shares_of_discrepancy(solution)[0][0] > PRECISE
+        return STEPS["law" if is_law_wrong else "design"]
     if others is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]

@@ -17,6 +17,7 @@ from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
 from tissuq.prediction.bands import Band, inside_band, predict_bands
 from tissuq.prediction.moments import drawn_curves
+from tissuq.prediction.scores import root_mean_square
 
 __all__ = ["Described", "Way", "described", "is_determined", "points_along", "share_along", "ways_of"]
 
@@ -124,7 +125,7 @@ def described(
 
 def is_determined(alone: Band, stress: Band) -> bool:
     """Return whether the stress of the material alone is known at all: to no less than all stress beside it."""
-    return bool(((alone.high - alone.low) ** 2).mean() / 4 <= (stress.median**2).mean())
+    return root_mean_square(alone.high - alone.low) / 2 <= root_mean_square(stress.median)
 
 
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:

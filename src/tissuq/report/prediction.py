@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Mapping
 from dataclasses import replace
-from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +15,22 @@ from tissuq.assessment.uses import Use, Verdict
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
-from tissuq.prediction.bands import Band
 from tissuq.report.measured import named
+from tissuq.report.prediction_tables import (
+    MAX_ROWS,
+    band_headers,
+    end_words,
+    kind_words,
+    median_words,
+    readable_bands,
+    readable_scores,
+    score_headers,
+    scored_kind,
+    share_words,
+)
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.stability import SAME_STATES
-from tissuq.report.tables import interval, significant
 from tissuq.report.writer import read_record
 from tissuq.result_warning import in_shell
 from tissuq.studies.earlier_run import answering
@@ -33,22 +41,11 @@ if TYPE_CHECKING:
 
     from tissuq.studies.prediction_settings import PredictionSettings
 
-__all__ = [
-    "band_headers",
-    "prediction_figure",
-    "prediction_result",
-    "readable_bands",
-    "readable_scores",
-    "score_headers",
-]
+__all__ = ["prediction_figure", "prediction_result"]
 
 FloatArray = NDArray[np.float64]
 
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
-MAX_ROWS = 13
-"""Number of rows of the table of bands on page and terminal; the files have all."""
-MAX_SHARE, MAX_STRESS, MIN_STRESS = 10.0, 1e5, 1e-12
-"""Largest share shown as a percentage; stresses (in the unit of the run) shown in powers of ten, and as zero."""
 
 
 def prediction_figure(prediction: Prediction) -> Figure:
@@ -160,7 +157,8 @@ def _shares(prediction: Prediction) -> list[Number]:
         kind = "with" if prediction.kinds[0] else "without"
         rows = prediction.scores[(prediction.scores["discrepancy"] == kind) & (prediction.scores["range"] == "all")]
         inside, all_of_them = round(float((rows["inside"] * rows["count"]).sum())), int(rows["count"].sum())
-        value, width = f"{inside} of {all_of_them}", f"half width of the band {_share(float(rows['half_width'].max()))}"
+        value = f"{inside} of {all_of_them}"
+        width = f"half width of the band {share_words(float(rows['half_width'].max()))}"
         remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
         numbers.append(Number("measurements inside the band", value, remark=remark))
     beyond = count - int(prediction.is_calibrated.sum())
@@ -244,98 +242,6 @@ def _sections(prediction: Prediction) -> tuple[Section, ...]:
     return tuple(sections)
 
 
-def band_headers(prediction: Prediction) -> list[str]:
-    """Return the heads of the columns of `readable_bands`."""
-    stress_column = ["measured"] * (len(prediction.stresses) > 1)
-    names = [control.name for control in prediction.mode.controls]
-    share = f"{100 * prediction.prob:.4g} %"
-    bands = ["median", f"{share} of the stress", f"{share} of measurements"]
-    bands_alone = ["alone: median", "alone: stress", "alone: measurements"] if prediction.kinds[0] else []
-    return [*names, *stress_column, *bands, *bands_alone, "calibrated"]
-
-
-def readable_bands(prediction: Prediction) -> list[list[str]]:
-    """Return some rows of the bands, from end to end, as text in the unit of the run."""
-    rows, scale = [], prediction.unit.to_mpa
-    count = len(prediction.points)
-    indices = np.unique(np.linspace(0, count - 1, min(count, MAX_ROWS)).round().astype(int))
-    for channel, name in enumerate(prediction.stresses):
-        for index in indices:
-            cells = [f"{column[index]:.4g}" for column in prediction.controls.values()]
-            cells += [name] * (len(prediction.stresses) > 1)
-            for kind in prediction.kinds:
-                stress, noisy = (prediction.curves[channel, kind, noise] for noise in (False, True))
-                cells += [_median(stress, index, scale), _ends(stress, index, scale), _ends(noisy, index, scale)]
-            rows.append([*cells, "yes" if prediction.is_calibrated[index] else "no"])
-    return rows
-
-
-def score_headers(prediction: Prediction) -> list[str]:
-    """Return the heads of the columns of `readable_scores`."""
-    stress_column = ["measured"] * (len(prediction.stresses) > 1)
-    unit = prediction.unit.name
-    inside = f"inside {100 * prediction.prob:.4g} %"
-    return [
-        "prediction",
-        *stress_column,
-        "range",
-        "points",
-        inside,
-        "half width",
-        "error",
-        f"CRPS, {unit}",
-        f"interval score, {unit}",
-    ]
-
-
-def readable_scores(prediction: Prediction) -> list[list[str]]:
-    """Return how the measurements are predicted as text."""
-    rows = []
-    assert prediction.scores is not None  # noqa: S101 (requested only if there are measurements)
-    for row in prediction.scores.to_dict("records"):
-        cells = [_of(prediction, row)] + [row["measured"]] * (len(prediction.stresses) > 1)
-        shares = [_share(row[name]) for name in ("inside", "half_width", "error")]
-        stresses = [_stress(row[name]) for name in ("crps", "interval_score")]
-        rows.append([*cells, row["range"], f"{row['count']}", *shares, *stresses])
-    return rows
-
-
-def _kind(prediction: Prediction, kind: bool) -> str:
-    model = prediction.posterior.model
-    return f"with {model.discrepancy.name}" if kind else f"{model.material.name} alone"
-
-
-def _of(prediction: Prediction, row: Mapping[Any, Any]) -> str:
-    return _kind(prediction, row["discrepancy"] == "with")
-
-
-def _share(value: float) -> str:
-    return "" if isnan(value) else f"{value:.0%}" if value < MAX_SHARE else f"> {MAX_SHARE:.0%}"
-
-
-def _stress(value: float) -> str:
-    return significant(value) if abs(value) < MAX_STRESS else f"{value:.0e}"
-
-
-def _median(band: Band, index: int, scale: float) -> str:
-    median, width = (float(stress[index]) / scale for stress in (band.median, band.high - band.low))
-    if max(abs(median), width) < MIN_STRESS:
-        return "0"
-    return (
-        interval(median, median, min(width / 4, abs(median) or width))[0]
-        if abs(median) < MAX_STRESS
-        else f"{median:.0e}"
-    )
-
-
-def _ends(band: Band, index: int, scale: float) -> str:
-    low, high = (float(stress[index]) / scale for stress in (band.low, band.high))
-    if max(-low, high) < MIN_STRESS:
-        return "0"
-    texts = interval(low, high, (high - low) / 4) if max(-low, high) < MAX_STRESS else (f"{low:.0e}", f"{high:.0e}")
-    return "{} to {}".format(*texts)
-
-
 def _lead(prediction: Prediction) -> str:
     """Return the finding in a sentence or two."""
     return _lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction)
@@ -355,8 +261,8 @@ def _lead_of_scores(prediction: Prediction) -> str:
         ]
         stress_words = f" ({name})" if len(prediction.stresses) > 1 else ""
         findings = [
-            f"{row['inside']:.0%} lie in the {100 * prediction.prob:.4g} % band ({_of(prediction, row)}), "
-            f"whose median errs by {_share(row['error'])} of the stress"
+            f"{row['inside']:.0%} lie in the {100 * prediction.prob:.4g} % band ({scored_kind(prediction, row)}), "
+            f"whose median errs by {share_words(row['error'])} of the stress"
             for row in rows.to_dict("records")
         ]
         count = rows["count"].iloc[0]
@@ -371,14 +277,14 @@ def _lead_of_bands(prediction: Prediction) -> str:
 
     The numbers are of the end of what is calibrated, with the discrepancy where the run has one.
     """
-    index, change, kind = _calibrated_end(prediction), _changes(prediction), _kind(prediction, prediction.kinds[0])
+    index, change, kind = _calibrated_end(prediction), _changes(prediction), kind_words(prediction, prediction.kinds[0])
     farthest = int(change.argmax())
     if change[index] < change[farthest]:
         stresses = _stresses_at(prediction, farthest, prediction.kinds[0])
         return f"Extrapolated to {_point(prediction, farthest)}, {stresses}: {kind}."
     if not prediction.kinds[0]:
         return f"Predicted by {kind}."
-    alone = _kind(prediction, kind=False)
+    alone = kind_words(prediction, kind=False)
     return f"Predicted {kind}. There, for {alone}, {_stresses_at(prediction, index, kind=False)}."
 
 
@@ -387,17 +293,15 @@ def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
     texts = []
     for channel, name in enumerate(prediction.stresses):
         band, scale = prediction.curves[channel, kind, False], prediction.unit.to_mpa
-        median, ends = (words(band, index, scale) for words in (_median, _ends))
+        median, ends = (words(band, index, scale) for words in (median_words, end_words))
         texts.append(f"the {name} is {median} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
     return " and ".join(texts)
 
 
 def _calibrated_end(prediction: Prediction) -> int:
     """Return which calibrated point is farthest from rest, or which of all where none is calibrated."""
-    change = _changes(prediction)
-    return int(
-        np.where(prediction.is_calibrated, change, -1.0).argmax() if prediction.is_calibrated.any() else change.argmax()
-    )
+    candidates = prediction.is_calibrated | (not prediction.is_calibrated.any())
+    return int(np.where(candidates, _changes(prediction), -1.0).argmax())
 
 
 def _changes(prediction: Prediction) -> FloatArray:

@@ -55,8 +55,6 @@ EVIDENCE = (
 def specimen_answer(study: SpecimenStudy) -> Result:
     """Return the answer of a fit alone, which is there before anything is assessed."""
     answer, unit = study.answer, study.unit
-    of_law = f" {answer.law}" if answer.law else ""
-    along_axes = f" {answer.sheet.in_words(unit)}" if answer.sheet else ""
     return Result(
         command="fit",
         title=f"{named(study.experiment)}: {study.settings.material} with the discrepancy '{study.main}'",
@@ -66,7 +64,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
             for name, mean, low, high in answer.estimates
         )
         + _over_discrepancies(study),
-        finding=f"{answer.meaning_in_words}{along_axes}{of_law}",
+        finding=" ".join(answer.sentences),
         uses=answer.uses,
         next_step=answer.next_step.shell,
         warnings=tuple(study.warnings),

@@ -54,7 +54,6 @@ REGION_CODES: Mapping[str, tuple[str, Severity]] = {
 HYSTERESIS = (
     "loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one curve"
 )
-ONE_BRANCH = "--cycle last --branch loading"
 DISTURBED = {"rupture", "hold", "slip"}
 """What makes loading and unloading differ without hysteresis."""
 
@@ -96,7 +95,7 @@ def _stretch_size(reading: Reading, number: int) -> str:
 
 def _cycles(reading: Reading, number: int) -> str:
     count, ratios = len(reading.used_cycles), _ratios(reading)
-    if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count or ratios == count:
+    if not _has_cycles(reading) or ratios == count:
         return ""
     if ratios > 1:
         return (
@@ -106,10 +105,16 @@ def _cycles(reading: Reading, number: int) -> str:
     numbered = advice_on_numbered_tests(reading.table, reading.choices, reading.recorded.course)
     if share := _hysteresis_share(reading, number):
         seen = f"all {count} cycles are used, and {HYSTERESIS.format(share=share)}"
-        advice = f"to fit one branch of one cycle, give {ONE_BRANCH}"
+        advice = "to fit one branch of one cycle, give --cycle last --branch loading"
     else:
         seen, advice = f"all {count} cycles are used", "to fit one, give --cycle last, first or a number"
     return f"{seen}; {'; '.join(filter(None, (advice, numbered)))}."
+
+
+def _has_cycles(reading: Reading) -> bool:
+    """Return whether there are several cycles of enough rows to be some."""
+    count = len(reading.used_cycles)
+    return count > 1 and len(reading.used) >= MIN_ROWS_PER_CYCLE * count
 
 
 def _ratios(reading: Reading) -> int:
@@ -120,10 +125,10 @@ def _ratios(reading: Reading) -> int:
 
 
 def _hysteresis(reading: Reading, number: int) -> str:
+    if _has_cycles(reading) and _ratios(reading) == 1:
+        return ""  # said of the cycles
     share = _hysteresis_share(reading, number)
-    if not share or ONE_BRANCH in _cycles(reading, number):
-        return ""
-    return f"{HYSTERESIS.format(share=share)}; to fit one of them, give --branch loading or unloading."
+    return f"{HYSTERESIS.format(share=share)}; to fit one of them, give --branch loading or unloading." if share else ""
 
 
 def _hysteresis_share(reading: Reading, number: int) -> float:
