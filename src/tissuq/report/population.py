@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.modulus import modulus_symbols
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.picture import numbers_of
 from tissuq.population.warnings import far_specimens
-from tissuq.report.population_figures import Bands, first_parameter_figure, patient_figure, specimens_figure
+from tissuq.report.population_figures import Bands, headline, headline_figure, patient_figure, specimens_figure
 from tissuq.report.population_tables import (
     copy_of_covariates,
     effects_of_covariates,
@@ -109,8 +107,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         finding=_lead(study),
         next_step=_next_step(population, settings.without),
         picture=Picture(
-            "answer", lambda: first_parameter_figure(population, unit),
-            "The first parameter of every specimen", SPECIMENS,
+            "answer", lambda: headline_figure(population, unit),
+            f"{headline(population)[0].capitalize()} of every specimen", SPECIMENS,
         ),
         tables=(
             Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), _note(population)),
@@ -156,19 +154,12 @@ def _share(half_width: float) -> str:
 
 
 def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
-    """Return what to expect of a new specimen, and median and spread of the population.
-
-    Of the initial shear modulus where it is a multiple of the first parameter, and of this parameter otherwise.
-    """
+    """Return what to expect of a new specimen, and median and spread of the population: of its headline."""
     population = study.population
     symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
     factor, unit = _scale(study, symbol)
     table = numbers_of(population.summary(unit="MPa"))
-    model = population.complete.model
-    is_multiple = modulus_symbols(model) == (symbol,) and not model.bent_symbols
-    words = "initial shear modulus" if is_multiple else symbol
-    alone = [float(parameter.symbol == symbol) for parameter in model.material.parameters]
-    times = initial_shear_modulus(model.material, alone) if is_multiple else 1.0
+    words, times = headline(population)
 
     def number(name: str, quantity: str, divisor: float, unit: str) -> Number:
         median, low, high = (table[symbol, quantity][end] / divisor for end in ("median", *ENDS))

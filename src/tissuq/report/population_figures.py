@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from tissuq.assessment.modulus import modulus_symbols
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
-from tissuq.population.picture import height_of
+from tissuq.mechanics import initial_shear_modulus
+from tissuq.population.picture import draw_specimens, height_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,16 +23,33 @@ if TYPE_CHECKING:
 
     from tissuq.population import Population
 
-__all__ = ["Bands", "first_parameter_figure", "patient_figure", "specimens_figure"]
+__all__ = ["Bands", "headline", "headline_figure", "patient_figure", "specimens_figure"]
 
 Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
 """Stress of a new specimen with the model error, and of the material alone."""
 
 
-def first_parameter_figure(population: Population, unit: StressUnit) -> Figure:
-    """Return the panel of the first parameter, for the head of a page."""
+def headline(population: Population) -> tuple[str, float]:
+    """Return what a page says first, and its ratio to the first parameter.
+
+    The initial shear modulus where it is a multiple of the first parameter, and this parameter otherwise.
+    """
+    model, symbol = population.complete.model, population.symbols[0]
+    if modulus_symbols(model) != (symbol,) or model.bent_symbols:
+        return symbol, 1.0
+    of_the_first = [float(parameter.symbol == symbol) for parameter in model.material.parameters]
+    return "initial shear modulus", initial_shear_modulus(model.material, of_the_first)
+
+
+def headline_figure(population: Population, unit: StressUnit) -> Figure:
+    """Return the panel of the headline, for the head of a page."""
+    symbol, (words, ratio) = population.symbols[0], headline(population)
+    summary, specimens = (ratio * of(unit=unit.name) for of in (population.summary, population.specimen_summary))
+    unit_name = population.unit_of(symbol, unit).name
     with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
-        population.draw(on_figure(figure, 1, 1), unit)
+        drawn = on_figure(figure, 1, 1)
+        draw_specimens(drawn, summary, specimens, {symbol: unit_name})
+        drawn.axes[0].set_xlabel(f"{words} [{unit_name}]" if unit_name else words)
     return figure
 
 

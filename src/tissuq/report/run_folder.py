@@ -219,10 +219,11 @@ def _templates() -> Environment:
 
 
 def _prose(text: str) -> Markup:
-    """Return a text as HTML, with its ``**strong**`` and `` `code` ``; everything else in it is escaped."""
+    """Return a text as HTML: ``**strong**``, `` `code` ``, options in one piece; everything else in it is escaped."""
     from markupsafe import Markup, escape
 
     marked = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", str(escape(text)))
+    marked = re.sub(r"(?<![\w-])(--[a-z][a-z-]+[a-z])", r"<span class=option>\1</span>", marked)
     return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", marked))  # noqa: S704 (escaped above)
 
 

@@ -62,10 +62,10 @@ def _side_by_side(widths: Sequence[int], available: int) -> list[list[int]]:
     return blocks
 
 
-def print_warnings(warnings: Sequence[str]) -> None:
+def print_warnings(warnings: Sequence[str], head: str = "Warning") -> None:
     """Print warnings about a result."""
     for text in map(in_shell, warnings):
-        print(fill(text, TEXT_WIDTH, initial_indent="Warning: ", subsequent_indent="  ", break_on_hyphens=False))
+        print(fill(text, TEXT_WIDTH, initial_indent=f"{head}: ", subsequent_indent="  ", break_on_hyphens=False))
 
 
 def print_explanations(explanations: Sequence[str]) -> None:
@@ -100,7 +100,9 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
         _print_next(record["next"], folder)
     for table in record["tables"]:
         _print_table(table)
-    print_warnings([warning["text"] for warning in shown if warning["severity"] != Severity.PROBLEM])
+    for warning in shown:
+        if warning["severity"] != Severity.PROBLEM:
+            print_warnings([warning["text"]], "Note" if warning["severity"] == Severity.NOTE else "Warning")
     for section in record["sections"] if details else ():
         print(f"\n{section['title']}")
         print_explanations(list(map(_plain, section["text"])))

@@ -146,14 +146,20 @@
   if (data.fixed.length) element("p", { className: "soft", textContent: `At their medians: ${data.fixed.join(", ")}.` }, sliders);
 
   const range = () => [test.x[0], test.x[test.x.length - 1]];
+  // The measurements beside a stretch: loading and unloading, and the ends of several.
+  const measuredAt = (x, reach) => {
+    const near = isBack => test.measured.filter((_, index) => Math.abs(test.measured_at[index] - x) <= reach && test.is_back[index] === isBack);
+    const ends = values => [...new Set([Math.min(...values), Math.max(...values)].map(number))].join(" to ");
+    const branches = [[near(false), test.is_back.includes(true) ? " (loading)" : ""], [near(true), " (unloading)"]];
+    const texts = branches.filter(([values]) => values.length).map(([values, branch]) => ends(values) + branch);
+    return texts.length ? `measured ${texts.join(" and ")}, ` : "";
+  };
   const sentence = x => {
-    const near = test.measured_at.reduce((best, value, index) => Math.abs(value - x) < Math.abs(test.measured_at[best] - x) ? index : best, 0);
-    const [low, high] = range(), isNear = test.measured.length && Math.abs(test.measured_at[near] - x) <= (high - low) / 200;
-    const value = key => number(at(column(key), x));
-    return `${test.control} ${number(x)}: ` + (isNear ? `measured ${number(test.measured[near])}, ` : "") +
+    const [low, high] = range(), value = key => number(at(column(key), x));
+    return `${test.control} ${number(x)}, in ${data.unit}: ` + measuredAt(x, (high - low) / 200) +
       `predicted ${value("median")}, 95 % of measurements ${value("low")} to ${value("high")}, ` +
       `95 % of the stress ${value("stress_low")} to ${value("stress_high")}` +
-      (view.alone ? `, material alone ${value("alone")}` : "") + (isOn("yours") ? `, yours ${value("yours")}` : "") + ` ${data.unit}`;
+      (view.alone ? `, material alone ${value("alone")}` : "") + (isOn("yours") ? `, yours ${value("yours")}` : "");
   };
   const move = (x, source) => {
     const [low, high] = range();
