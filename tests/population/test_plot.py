@@ -4,7 +4,9 @@ import pytest
 
 import tissuq as tq
 from tissuq.drawing.panels import panels
+from tissuq.experiments.units import stress_unit
 from tissuq.population.picture import draw_specimens
+from tissuq.report.population_figures import headline, headline_figure
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +32,17 @@ def test_every_specimen_is_a_row_with_its_intervals_in_the_unit_of_the_measureme
     np.testing.assert_allclose(bars, 1000 * np.concatenate(ends))
     assert axis.get_xlabel() == "C10 [kPa]"
     plt.close(figure)
+
+
+@pytest.mark.slow
+def test_the_head_of_a_page_draws_the_modulus_which_is_twice_c10(population):
+    assert headline(population) == ("initial shear modulus", 2.0)
+    (axis,) = headline_figure(population, stress_unit("kPa")).axes
+    table = population.specimen_summary(unit="MPa").xs("C10", level="parameter").sort_values("median")
+    bars = [line.get_xdata() for line in axis.lines if line.get_marker() == "None"]
+    ends = [table[[f"{prefix}hdi_low", f"{prefix}hdi_high"]].to_numpy() for prefix in ("alone_", "")]
+    np.testing.assert_allclose(bars, 2000 * np.concatenate(ends))
+    assert axis.get_xlabel() == "initial shear modulus [kPa]"
 
 
 @pytest.mark.slow

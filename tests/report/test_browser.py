@@ -133,6 +133,22 @@ def test_a_stretch_is_typed_reached_by_keys_and_dragged_and_its_numbers_are_read
         assert "beyond 0.6 to 2" in page.inner_text(READOUT)
 
 
+def test_loading_and_unloading_are_read_out_apart(tmp_path):
+    loading = np.linspace(1, 1.4, 9)
+    rows = [(x, x - x**-2) for x in loading] + [(x, 0.8 * (x - x**-2)) for x in loading[-2::-1]]
+    file = tmp_path / "cycle.csv"
+    file.write_text("stretch,stress_kPa\n" + "".join(f"{x},{y}\n" for x, y in rows), encoding="utf-8")
+    study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 0.0001}], discrepancies=["none"]))
+    folder = tmp_path / "run"
+    folder.mkdir()
+    write_result(specimen_result(study, [file]), folder)
+    with opened(folder / "report.html") as page:
+        page.fill(TYPED, "1.2")
+        stress = 1.2 - 1.2**-2
+        words = f"stretch 1.2, in kPa: measured {stress:.3g} (loading) and {0.8 * stress:.3g} (unloading), predicted"
+        assert words in page.inner_text(READOUT)
+
+
 def test_parameters_that_are_moved_draw_the_material_alone(of_one_test):
     with opened(of_one_test) as page:
         page.fill(TYPED, "1.5")

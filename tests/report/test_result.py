@@ -199,6 +199,20 @@ def test_the_terminal_says_the_answer_first_and_counts_the_rest(tmp_path, capsys
     assert out.endswith(f"Report: {tmp_path / 'report.html'}\n")
 
 
+def test_the_terminal_calls_a_note_a_note(capsys):
+    print_result(result_of(warnings=warnings_of(Severity.CAUTION, Severity.NOTE)).record())
+    out = capsys.readouterr().out
+    assert "Warning: warning 0" in out
+    assert "Note: warning 1" in out
+
+
+def test_options_in_warnings_stay_in_one_piece_on_a_page(tmp_path):
+    warning = ResultWarning("give --load-zero first, not <b>a--b</b>", severity=Severity.CAUTION)
+    write_result(result_of(warnings=(warning,)), tmp_path, figures=False)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "give <span class=option>--load-zero</span> first, not &lt;b&gt;a--b&lt;/b&gt;" in page
+
+
 def test_details_leave_nothing_out(tmp_path, capsys):
     record = result_of(warnings=warnings_of(*[Severity.CAUTION] * 5)).record()
     print_result(record, tmp_path, details=True)
