@@ -26,6 +26,7 @@ SCRIPTS = {name: Path(__file__).with_name(f"{name}.js").read_text() for name in 
 
 @pytest.fixture(scope="module")
 def browser():
+    sync_api.expect.set_options(timeout=PATIENCE)
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         yield browser
@@ -174,7 +175,7 @@ def test_from_a_file_to_the_answer_and_all_that_follows(visit, tmp_path, write_s
     assert low < modulus < high
     report = page.frame_locator("#report iframe")
     assert report.locator(".numbers .first").inner_text().split()[3] in page.inner_text(".numbers .first")
-    assert report.locator("canvas").count() > 0
+    sync_api.expect(report.locator("canvas")).not_to_have_count(0)
     page.select_option("#material", "yeoh")
     assert page.is_visible("#stale")
     page.select_option("#material", "neo-hookean")
@@ -301,7 +302,8 @@ def test_files_chosen_before_the_page_has_its_session_are_not_lost(browser, addr
     page.goto(address)
     page.wait_for_function("document.getElementById('pick') !== null")
     page.set_input_files("#pick", path)
-    page.wait_for_timeout(200)
+    while not held:
+        page.wait_for_timeout(20)
     held[0].continue_()
     page.wait_for_selector("#tests .plot, #refusal .question")
     assert "first.csv" in page.inner_text("#file-list")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import gallery
 import tissuq as tq
+from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
 from tissuq.assessment.next_step import Step, _with_options
-from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words
+from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, uses_of
+from tissuq.mechanics import material_named
+from tissuq.model.discrepancy import discrepancy_named
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.r_[np.linspace(0.7, 0.98, 8), np.linspace(1.02, 1.6, 12)]
@@ -67,6 +71,39 @@ def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
     posterior = gallery.fit(data, discrepancy="none", noise_sd=0.01)
     assert verdicts(posterior) == [Verdict.CARE, Verdict.YES, Verdict.CARE, Verdict.CARE]
     assert "if the material is right" in posterior.answer.uses[0].reason
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        ((0.03, 0.01, 0.05), ""),
+        ((0.1, 0.05, 0.15), "yeoh alone is off by 10% of the stress"),
+        ((0.4, 0.2, 0.6), "yeoh alone is wrong here: the discrepancy carries 40% of the stress (95 % interval 20% to"),
+        (
+            (2.0, 1.4, 2.6),
+            "yeoh alone is wrong here: the discrepancy opposes it with 200% of the stress (95 % interval",
+        ),
+        ((0.9, 0.3, 1.5), "How much of the stress is yeoh's and how much the discrepancy's is not determined"),
+    ],
+)
+def test_how_far_the_law_is_off_alone_is_said_where_it_is_known(share, words, monkeypatch):
+    model = SimpleNamespace(discrepancy=discrepancy_named("auto"), material=material_named("yeoh"))
+    monkeypatch.setattr(answer, "shares_of_discrepancy", lambda solution: (share, (0.0, 0.0, 0.0)))
+    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False)
+    assert text.startswith(words)
+    assert bool(text) == bool(words)
+    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True)
+    assert at_rest.startswith("There is stress at rest") == bool(words)
+
+
+def test_a_doubtful_measurement_makes_the_modulus_one_to_report_with_care():
+    clean = yeoh(discrepancy="auto")
+    torn = ResultWarning("it was torn.", "measurements", Severity.CAUTION)
+    inside = np.ones(len(STRETCH), bool)
+    use = uses_of(clean.solution, clean.initial_shear_modulus, clean.stable_ranges, [torn], inside)[0]
+    assert clean.answer.uses[0].verdict is Verdict.YES
+    assert use.verdict is Verdict.CARE
+    assert use.reason.endswith("but see the warning about the measurements")
 
 
 def test_a_process_in_stress_says_nothing_of_other_modes_and_is_no_material():

@@ -14,7 +14,7 @@ from scipy.stats import norm, truncnorm
 import tissuq as tq
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report.population import _next_step
-from tissuq.result_warning import Severity
+from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
 MODULI = [0.15, 0.4, 0.5, 0.6, 0.9, 0.3]
@@ -442,6 +442,8 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     (warning,) = _far_specimens(population)
     assert warning.severity == Severity.PROBLEM
     assert "the initial modulus of soft is 0.0053 times that of the other specimens" in warning
-    assert _next_step(population).startswith("look at soft first")
+    assert _next_step(population, []).startswith("look at soft first")
+    without_unit = ResultWarning("the unit of the stress is not stated.", "doubtful-reading", Severity.PROBLEM)
+    assert _next_step(population, [without_unit]).startswith("say what the files do not")
     population.posteriors.pop("soft")
-    assert "finite elements" in _next_step(population)
+    assert "finite elements" in _next_step(population, [])

@@ -45,7 +45,7 @@ def test_what_is_far_below_is_told_at_the_edge(table):
     far = table.copy()
     far.loc["none", "log_bayes_factor"] = -12_345.0
     texts = [text.get_text() for text in comparison_figure(far, KPA).axes[0].texts]
-    assert "-12,345" in texts
+    assert "-12345" in texts
 
 
 def test_what_is_not_known_is_said(table):

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import tissuq as tq
-from tissuq.report.laws import law_lead
+from tissuq.report.laws import HEADERS, _numbers, _readable, law_lead
 from tissuq.studies.laws import LawStudy
 
 
@@ -66,3 +66,27 @@ def test_a_law_that_is_rarely_stable_is_not_the_one_to_continue_with_where_anoth
         ["probable", "second", "third"],
     )
     assert law_study(SimpleNamespace(table_in=lambda unit: laws)).recommended == name
+
+
+def test_laws_that_are_as_good_as_the_best_are_named_where_they_are_few_and_a_share_above_1_is_called_so():
+    names = ["a", "b", "c", "d"]
+    table = pd.DataFrame(index=names).assign(
+        modulus=1.0, modulus_low=0.9, modulus_high=1.1, parameters=1, probability=0.25, r_squared=0.9, nrmse=0.1,
+        elpd_difference=[0.0, 0.1, 0.2, 0.3], elpd_difference_error=1.0, stable=1.0, stable_beyond=1.0,
+        discrepancy_share=0.5,
+    )  # fmt: skip
+    modulus = SimpleNamespace(mean=1.0, hdi=lambda: (0.9, 1.1))
+    remarks = {}
+    for count in range(1, 5):
+        comparison = SimpleNamespace(table_in=lambda unit, count=count: table[:count], modulus=modulus)
+        remarks[count] = _numbers(law_study(comparison))[-1].remark
+    assert remarks == {
+        1: "no other as good",
+        2: "with its discrepancy as good: b",
+        3: "with its discrepancy as good: b and c",
+        4: "with its discrepancy as good: 3 others",
+    }
+    row = table.iloc[0]
+    column = HEADERS.index("share of discrepancy")
+    assert _readable("a", row, 1.0)[column] == "50 %"
+    assert _readable("a", row.replace(0.5, 1.7), 1.0)[column] == "> 100 %"

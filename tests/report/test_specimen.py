@@ -28,8 +28,12 @@ def test_the_numbers_are_those_of_the_answer_in_the_unit_of_the_file(result, spe
     assert [modulus.value, modulus.low, modulus.high] == pytest.approx([1e3 * x for x in (marginal.mean, low, high)])
     assert {modulus.unit, headline.unit} == {"kPa"}
     means = {name: 1e3 * posterior.marginals["C10"].mean for name, posterior in specimen_study.posteriors.items()}
-    low, high = (float(end.replace(",", "")) for end in over_discrepancies.value.removesuffix(" kPa").split(" to "))
+    low, high = (float(end) for end in over_discrepancies.value.removesuffix(" kPa").split(" to "))
     assert (low, high) == pytest.approx((min(means.values()), max(means.values())), rel=0.02)
+    low, high = (1e3 * end for end in specimen_study.posteriors["auto"].marginals["C10"].hdi())
+    outside = [name for name, mean in means.items() if not low <= mean <= high]
+    assert bool(over_discrepancies.remark) == bool(outside)
+    assert all(name in over_discrepancies.remark for name in outside)
     assert specimen_study.posteriors["auto"].model.meaning in result.finding
 
 

@@ -103,30 +103,37 @@ def answer_of(
     model, stiffness = solution.model, modulus(solution)
     uses = uses_of(solution, stiffness, ranges, warnings, inside)
     has_stress_at_rest = any(warning.code == "stress-at-rest" for warning in warnings)  # which is no law's
-    headline, law = model.headline, "" if has_stress_at_rest else _law_in_words(solution)
+    headline = model.headline
     return Answer(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
         model.meaning,
         uses,
         next_step(solution, uses, warnings),
         model.experiment.stress_unit,
-        law,
+        _law_in_words(solution, has_stress_at_rest),
         sheet_stresses(solution),
     )
 
 
-def _law_in_words(solution: Solution) -> str:
+def _law_in_words(solution: Solution, has_stress_at_rest: bool) -> str:
     """Return in words how far the law by itself is from the measurements; nothing where it describes them."""
     (mean, low, high), _ = shares_of_discrepancy(solution)
     if not has_energy(solution.model) or mean <= NOTABLE_SHARE:
         return ""
     law = solution.model.material.name
+    if has_stress_at_rest:
+        return f"There is stress at rest, so that it cannot be said how far {law} alone is off."
     if mean <= PRECISE:
         return f"{law} alone is off by {mean:.0%} of the stress: use it with the discrepancy, as exports do."
     if high < 1:
         return (
             f"{law} alone is wrong here: the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to "
             f"{high:.0%})."
+        )
+    if low > 1:
+        return (
+            f"{law} alone is wrong here: the discrepancy opposes it with {mean:.0%} of the stress (95 % interval "
+            f"{low:.0%} to {high:.0%})."
         )
     return (
         f"How much of the stress is {law}'s and how much the discrepancy's is not determined: use both together, as "

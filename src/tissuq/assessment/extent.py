@@ -173,6 +173,11 @@ class Assessment:
             return
         if high < 1:
             yield f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"
+        elif low > 1:
+            yield (
+                f"the discrepancy opposes the material: its stress is {mean:.0%} of that measured (95 % interval "
+                f"{low:.0%} to {high:.0%})"
+            )
         else:
             yield (
                 "the data do not determine how much of the stress the discrepancy carries (95 % interval "

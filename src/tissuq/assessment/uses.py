@@ -108,6 +108,8 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
     if "not-near-reference" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
+    if "measurements" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, but see the warning about the measurements"
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
         error = f"assumed error of load and area (tolerance 'stress', {100 * model.common_error:.0f} %)"
@@ -269,7 +271,7 @@ def _simulating(
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{worst.probability:.0%} of the plausible materials are stable where measured"
+    share = f"{worst.probability:.0%} of the draws are stable where measured"
     if worst.probability < MIN_STABLE:
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:

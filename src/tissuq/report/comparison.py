@@ -224,7 +224,7 @@ def _differences(axis: Axes, levels: Any, middle: pd.Series[float], low: Any, hi
                       fontsize=9, color="#5a6472")  # fmt: skip
         elif value < edge:
             axis.plot(edge, level, "<", color=BAND, ms=6)
-            axis.text(edge + margin, level, f"{value:,.0f}", va="center", fontsize=9, color=INK)
+            axis.text(edge + margin, level, f"{value:.0f}", va="center", fontsize=9, color=INK)
         else:
             if end > start:
                 axis.plot([max(start, edge), end], [level, level], color=BAND, lw=2, alpha=0.55, solid_capstyle="butt")

@@ -28,7 +28,7 @@ __all__ = ["HEADERS", "law_lead", "law_result", "readable_laws"]
 MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
 FEW_LAWS = 3
-"""Laws that a title names."""
+"""Laws that a title names; fewer are named beside the best."""
 DECIDED = 0.95
 """Probability of a law from which the data tell it from the others."""
 MODULUS = ("modulus", "modulus_low", "modulus_high")
@@ -113,8 +113,9 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
         remark = f"probability {_percent(float(table.probability[law]))}"
         numbers.append(Number("most probable law", law, remark=remark))
     best = str(table.elpd_difference.idxmin())
-    close = study.close
-    as_good = f"{len(close) - 1} other{'s' * (len(close) > 2)} as good" if len(close) > 1 else "no other as good"
+    others = [law for law in study.close if law != best]
+    named_others = " and ".join(others) if len(others) < FEW_LAWS else f"{len(others)} others"
+    as_good = f"with its discrepancy as good: {named_others}" if others else "no other as good"
     stable = float(table.stable[best])
     but = f"; stable over the measured range with a probability of {_percent(stable)}" if stable < MIN_STABLE else ""
     return (*numbers, Number("best for left-out measurements", best, remark=as_good + but))
@@ -137,7 +138,7 @@ def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
         difference if row.elpd_difference else "best",
         "" if row.r_squared != row.r_squared else f"{row.r_squared:.4f}",
         _percent(row.nrmse),
-        _percent(row.discrepancy_share),
+        "> 100 %" if row.discrepancy_share > 1 else _percent(row.discrepancy_share),
         f"{_percent(row.stable)} / {_percent(row.stable_beyond)}" if row.stable == row.stable else "",
     ]
 

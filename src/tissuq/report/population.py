@@ -24,11 +24,13 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT, law_files
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
+from tissuq.result_warning import ResultWarning
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tissuq.model.tolerances import Tolerances
     from tissuq.population import Population
 
 __all__ = ["HEADERS", "population_result", "readable_population"]
@@ -41,6 +43,10 @@ SPECIMENS = (
     "Every specimen by itself (grey) and within the population (blue): 95 % HPD and median. Bands: 95 % for a new "
     "specimen, and for the median of the population. At the bottom, complete pooling. Bars may run out of the panel; "
     "where the median of a specimen does, it stands at the edge with its interval."
+)
+AS_TESTED = (
+    " Intervals of single specimens are as tested: errors of their tests, such as slack or area, count as differences "
+    "between specimens (--estimand specimen tells these apart)."
 )
 PATIENT_CAPTION = (
     "Without measurement noise. Blue: material from the population, and the model error of a random specimen measured "
@@ -105,10 +111,10 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
-        next_step=_next_step(population, settings.without),
+        next_step=_next_step(population, study.warnings, settings.without),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
-            f"{headline(population)[0].capitalize()} of every specimen", SPECIMENS,
+            f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
         ),
         tables=(
             Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), _note(population)),
@@ -122,10 +128,12 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     )  # fmt: skip
 
 
-def _next_step(population: Population, already_without: Sequence[str] = ()) -> str:
-    """Return what to do next: look at specimens that are far from the others before anything is computed with them."""
+def _next_step(population: Population, warnings: Sequence[str], already_without: Sequence[str] = ()) -> str:
+    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
+    if any(isinstance(warning, ResultWarning) and warning.code == "doubtful-reading" for warning in warnings):
+        return "say what the files do not, as the warning about what was read asks, and fit again"
     if far := list(far_specimens(population)):
         options = " ".join(f"--without {name}" for name in (*already_without, *far))
         return (
@@ -181,7 +189,8 @@ def _sections(
     is_one = len(population.symbols) == 1
     specimens = Picture(
         "specimens", lambda: specimens_figure(population, study.unit),
-        "Parameters of every specimen by itself and within the population", SPECIMENS, is_one,
+        "Parameters of every specimen by itself and within the population", _about_specimens(population),
+        is_one,
     )  # fmt: skip
     headers = ["specimen", "parameter", "unit", "by itself", "95 % HPD", "within the population", "95 % HPD"]
     sections = [Section("Every specimen", (specimens, Table(headers, _readable_specimens(study), text_columns=(1, 2))))]
@@ -213,10 +222,20 @@ def _sections(
         f"The specimens are integrated in closed form. {diagnostics.verdict} Effective share of the draws after "
         f"importance correction: {population.hierarchy.effective:.1%}. {study.seconds:.0f} s.",
     )
-    if tolerances := next(iter(population.posteriors.values())).model.tolerances:
+    if tolerances := _tolerances(population):
         sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
         computed += (f"Errors of the specimens' own tests are included (of the first one: {sizes}).",)
     return (*sections, Section("How to read it", (HOW_TO_READ,)), Section("How it was computed", (computed,)))
+
+
+def _about_specimens(population: Population) -> str:
+    """Return the caption of the figures of all specimens."""
+    return SPECIMENS if _tolerances(population) else SPECIMENS + AS_TESTED
+
+
+def _tolerances(population: Population) -> Tolerances:
+    """Return the errors of a specimen's own tests: of the first one, which stands for all."""
+    return next(iter(population.posteriors.values())).model.tolerances
 
 
 def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
@@ -321,8 +340,9 @@ def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -
 
 def _lead(study: PopulationStudy) -> str:
     """Return the finding in two sentences."""
-    symbol = study.population.symbols[0]
+    symbol, (words, times) = study.population.symbols[0], headline(study.population)
     factor, unit = _scale(study, symbol)
+    factor, quantity = factor / times, symbol if words == symbol else f"the {words}"
     table = numbers_of(study.population.summary(unit="MPa"))
     middle = significant(table[symbol, "median"]["median"] / factor)
     new, complete = (
@@ -330,11 +350,11 @@ def _lead(study: PopulationStudy) -> str:
         for name in ("new patient", "complete pooling")
     )
     far = " ".join(
-        f"{name} is {times:.2g} times as stiff as the others, which makes these intervals as wide as they are."
-        for name, times in far_specimens(study.population).items()
+        f"{name} is {ratio:.2g} times as stiff as the others, which makes these intervals as wide as they are."
+        for name, ratio in far_specimens(study.population).items()
     )
     return (
-        f"The median of {symbol} in the population is {middle} {unit}; for a specimen that has not been measured"
+        f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
         f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
     )

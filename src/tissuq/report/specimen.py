@@ -196,12 +196,18 @@ def _uncut(study: SpecimenStudy) -> list[str]:
 
 
 def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:
-    """Return between what the mean of the headline parameter lies with several discrepancies; nothing of one."""
+    """Return between what the mean of the headline parameter lies with several discrepancies; nothing of one.
+
+    With those of which it is not in the interval that the answer gives.
+    """
     if len(study.posteriors) == 1:
         return ()
     means = {name: study.posteriors[name].marginals[study.headline].mean / study.unit.to_mpa for name in _uncut(study)}
     ends = f"{significant(min(means.values()))} to {significant(max(means.values()))} {study.unit.name}"
-    return (Number(f"{study.headline} with {len(means)} discrepancies", ends),)
+    low, high = (end / study.unit.to_mpa for end in study.posteriors[study.main].marginals[study.headline].hdi())
+    beyond = ", ".join(name for name, mean in means.items() if not low <= mean <= high)
+    remark = f"beyond the interval above: {beyond}" if beyond else ""
+    return (Number(f"{study.headline} with {len(means)} discrepancies", ends, remark=remark),)
 
 
 def _comparison(summary: list[Row], study: SpecimenStudy) -> str:

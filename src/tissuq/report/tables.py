@@ -73,7 +73,7 @@ def significant(value: float | None, digits: int = 3) -> str:
     if value is None:
         return ""
     text = f"{value:.{digits}g}"
-    return f"{float(text):,.0f}" if "e+0" in text and abs(value) < 1e6 else text
+    return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e6 else text
 
 
 def interval(low: float, high: float, sd: float) -> tuple[str, str]:
