@@ -11,6 +11,9 @@ __all__ = ["interval_quantile", "log_interval"]
 
 FloatArray = NDArray[np.float64]
 
+ALMOST_NOTHING, ALMOST_ALL = -20.0, 8.5
+"""Scores below which the quick Phi soon underflows, and from which it is one in double precision."""
+
 
 def log_interval(low: Any, high: Any) -> FloatArray:
     """Return log(Phi(high) - Phi(low))."""
@@ -43,12 +46,12 @@ def _log_difference(lower: FloatArray, upper: FloatArray) -> FloatArray:
 
 
 def _log_phi(score: FloatArray) -> FloatArray:
-    """Return log Phi; the slow function only where the quick one underflows."""
+    """Return log Phi, zero where it rounds to that; the slow function only where the quick one underflows."""
     from scipy.special import log_ndtr, ndtr
 
-    with np.errstate(divide="ignore"):
-        value = np.asarray(np.log(ndtr(score)))
-    is_far = score < -20
-    if is_far.any():
-        value = np.where(is_far, log_ndtr(np.where(is_far, score, 0.0)), value)
+    score = np.asarray(score, dtype=np.float64)
+    value = np.zeros(score.shape)
+    matters, is_far = ~(score >= ALMOST_ALL), score < ALMOST_NOTHING  # what is no number stays none
+    value[matters] = np.log(ndtr(np.maximum(score[matters], ALMOST_NOTHING)))
+    value[is_far] = log_ndtr(score[is_far])
     return value

@@ -14,7 +14,7 @@ from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
 from tissuq.parameters.checks import check_probability
 from tissuq.posterior.netcdf import LabelledGroup
-from tissuq.prediction.densities import leave_one_out, pointwise_log_likelihood, replicate_data, stride
+from tissuq.prediction.densities import LeaveOneOut, pointwise_log_likelihood, replicate_data, stride
 
 __all__ = ["labelled_arrays", "labels_of", "summaries", "summaries_in"]
 
@@ -22,7 +22,9 @@ OF_VALUES = ("mean", "sd", "median", "hdi_low", "hdi_high")
 """Numbers of a summary that have the unit of their parameter."""
 
 
-def labelled_arrays(solution: Solution, seed: int, unit: StressUnit) -> dict[str, LabelledGroup]:
+def labelled_arrays(
+    solution: Solution, seed: int, unit: StressUnit, left_out: LeaveOneOut | None
+) -> dict[str, LabelledGroup]:
     """Return draws, replicated data, densities and measurements; the groups are those of `Posterior.data`.
 
     Stresses, and parameters that are stresses, are in the unit; densities are those of data in MPa in any.
@@ -59,9 +61,9 @@ def labelled_arrays(solution: Solution, seed: int, unit: StressUnit) -> dict[str
         ),
         "constant_data": LabelledGroup(coordinates, point),
     }
-    if not solution.is_of_data:
+    if left_out is None:  # it is the posterior of somebody who was not measured
         return groups
-    stress, left_out = ("chain", "draw", "measurement"), leave_one_out(solution)
+    stress = ("chain", "draw", "measurement")
     groups |= {
         "posterior_predictive": LabelledGroup(
             {"stress": (stress, replicate_data(solution, seed) / unit.to_mpa, in_stress)}, thinned_sample | point

@@ -38,6 +38,7 @@ from tissuq.posterior.plots import PosteriorPlots
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import inside_band, predict_band, stress_ratio
+from tissuq.prediction.densities import LeaveOneOut, leave_one_out
 from tissuq.result_warning import ResultWarning, most_severe_first
 
 if TYPE_CHECKING:
@@ -464,6 +465,19 @@ class Posterior(PosteriorPlots):
         return self._inside[key]
 
     @cached_property
+    def left_out(self) -> LeaveOneOut:
+        """The log density of every measurement given all others, in `data` and in `tissuq.compare`.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.7, 0.8, 0.9, 1.1, 1.2, 1.4, 1.7, 2], 0.02, seed=1)
+        >>> tq.fit(data, discrepancy="none", noise_sd=0.02).left_out.log_density.shape
+        (8,)
+        """
+        return leave_one_out(self.solution)
+
+    @cached_property
     def _inside(self) -> dict[tuple[bool, float], tuple[NDArray[np.bool_], ...]]:
         return {}
 
@@ -512,7 +526,8 @@ class Posterior(PosteriorPlots):
     def _groups(self, unit: StressUnit) -> dict[str, LabelledGroup]:
         headline = summaries(self.solution, parameters=[self.model.headline])[self.model.headline]
         labels = labels_of(self.solution, self.seed, headline)
-        return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed, unit)
+        left_out = self.left_out if self.solution.is_of_data else None
+        return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed, unit, left_out)
 
     def save(self, path: str | Path) -> None:
         """Write the whole posterior as NetCDF: `data`, which ArviZ and xarray open, and what `load` needs."""
