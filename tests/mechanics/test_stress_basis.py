@@ -107,9 +107,32 @@ def test_what_an_imaginary_step_cannot_differentiate_is_left_to_jax():
             return 0.5 * values[0] * abs(sum(stretch**2 for stretch in stretches) - 3) + 0 * stretches[0]
 
     strained = STRETCH[np.abs(STRETCH - 1) > 1e-9]
-    assert complex_step_stress(WithAbsolute(), Uniaxial().at(strained), np.ones((1, 1))) is None
+    for count in (1, 40):
+        assert complex_step_stress(WithAbsolute(), Uniaxial().at(strained), np.ones((count, 1))) is None
     expected = stress_basis(NeoHookean(), Uniaxial().at(strained)) / 2
     np.testing.assert_allclose(stress_basis(WithAbsolute(), Uniaxial().at(strained)), expected, rtol=1e-12)
+
+
+def test_a_law_that_writes_to_the_stretches_changes_nobody_elses():
+    class Writing(StretchMaterial):
+        """Neo-Hookean, with the squares in place of the stretches."""
+
+        parameters = (tq.Parameter("mu", "shear modulus"),)
+        name = "writing"
+        formula = "mu / 2 (I1 - 3)"
+        source = "this test"
+
+        def energy(self, stretches, values):
+            squares = 0.0
+            for stretch in stretches:
+                stretch *= stretch
+                squares = squares + stretch
+            return 0.5 * values[0] * (squares - 3)
+
+    states = Uniaxial().at(STRETCH)
+    for _ in range(2):
+        expected = stress_basis(NeoHookean(), states) / 2
+        np.testing.assert_allclose(stress_basis(Writing(), states), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

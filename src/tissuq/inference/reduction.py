@@ -225,7 +225,9 @@ def _designs(model: StatisticalModel, settings: Sequence[tuple[float, ...]]) -> 
     together = max(1, MAX_COMPLEX_STEP_VALUES // (len(model.states) * len(model.column_symbols)))
     for start in range(0, len(bent), together):
         bases = model.basis(model.states, bent[start : start + together])
-        yield np.array([model.rows(basis) for basis in bases])
+        columns = bases.swapaxes(0, 1)
+        rows = model.rows(columns.reshape(len(columns), -1))  # of all designs side by side
+        yield np.ascontiguousarray(rows.reshape(-1, *columns.shape[1:]).swapaxes(0, 1))
 
 
 @dataclass(frozen=True, eq=False)
