@@ -12,7 +12,7 @@ import gallery
 import tissuq as tq
 from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
-from tissuq.assessment.next_step import Step, _with_options
+from tissuq.assessment.next_step import STEPS, Step, _with_options
 from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, uses_of
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
@@ -103,7 +103,7 @@ def test_a_doubtful_measurement_makes_the_modulus_one_to_report_with_care():
     use = uses_of(clean.solution, clean.initial_shear_modulus, clean.stable_ranges, [torn], inside)[0]
     assert clean.answer.uses[0].verdict is Verdict.YES
     assert use.verdict is Verdict.CARE
-    assert use.reason.endswith("but see the warning about the measurements")
+    assert use.reason.endswith("; see the warning about the measurements")
 
 
 def test_a_process_in_stress_says_nothing_of_other_modes_and_is_no_material():
@@ -173,14 +173,18 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
     modulus = answer.estimates[0]
     assert 0.7 * (modulus.high - modulus.low) / 2 / modulus.mean < 1.96 * 0.18
     assert "spread between specimens" in answer.uses[0].reason
-    assert "further specimens" in answer.next_step.shell
+    assert "--specimen NAME" in answer.next_step.shell
+    assert STEPS["unnamed specimens"] == answer.next_step
 
 
 @pytest.mark.slow
 def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
     assert answer.meaning == tq.estimands()["specimen"].description
-    assert "nearly all of it the assumed error of load and area (tolerance 'stress', 7 %)" in answer.uses[0].reason
+    assert (
+        "nearly all of it the assumed error of load and area (tolerance 'stress' and 'test', 7 %)"
+        in answer.uses[0].reason
+    )
 
 
 def test_an_answer_prints_itself_in_its_unit():

@@ -342,7 +342,7 @@ def test_the_default_interval_of_a_file_is_of_the_specimen_and_says_so(cli, here
         assert f"Intervals are of {meaning}." in (here / name / "report.html").read_text()
         widths[name] = float(row["C10_hdi_high"]) - float(row["C10_hdi_low"])
     assert widths["as-tested"] < widths["specimen"] < widths["tissue"]
-    assert "of the stress (spread between specimens)" not in (here / "as-tested" / "report.html").read_text()
+    assert "of the stress of a specimen (its area" not in (here / "as-tested" / "report.html").read_text()
 
 
 def test_a_size_replaces_that_of_the_estimand_and_a_run_repeats_with_both(cli, here, specimen):

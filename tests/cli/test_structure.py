@@ -56,6 +56,9 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
         assert curves["force_without"].mean("draw_without").values[-1] == pytest.approx(float(rows[-1]["without_mean"]))
     for name in ("fields.vtu", "middle_draw.pvd", "steps/step_02.vtu", "figures/forces.svg", "figures/shares.png"):
         assert (folder / name).stat().st_size > 200, name
+    of_fit = json.loads((here / "run" / "result.json").read_text(encoding="utf-8"))["uses"][-1]
+    (use,) = json.loads((folder / "result.json").read_text(encoding="utf-8"))["uses"]
+    assert use == of_fit | {"purpose": "use of the fit in finite elements"}
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "too few for a 95 % band" in page
     assert "it takes more draws to tell them apart" in page

@@ -121,6 +121,16 @@ def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
     assert inspected(stretch, stress, cycle="last", branch="loading").warnings == ()
 
 
+def test_by_how_much_the_peaks_of_equal_cycles_fall_is_said(inspected):
+    stretch, _ = cycles([1.3, 1.3, 1.3], rows=50)
+    number = np.cumsum(np.r_[False, (np.diff(stretch)[1:] > 0) & (np.diff(stretch)[:-1] <= 0), False])
+    softer = np.select([number == 0, number == 1], [1.0, 0.9], 0.8)
+    text = notes(inspected(stretch, 1e3 * neo_hookean(stretch) * softer))
+    assert "all 3 cycles are used, at whose peaks the stress falls by 20% of the largest from the first to the" in text
+    growing, _ = cycles([1.2, 1.25, 1.3], rows=50)
+    assert "peaks" not in notes(inspected(growing, 1e3 * neo_hookean(growing)))
+
+
 @pytest.mark.parametrize("repeats", [1, 2])
 def test_a_protocol_of_several_ratios_is_no_repetition(tmp_path, repeats):
     ratios = np.repeat([(1, 1), (1, 0.5), (0.5, 1)], repeats, axis=0)

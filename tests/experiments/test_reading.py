@@ -485,16 +485,21 @@ def test_a_column_is_given_as_shear_by_name(tmp_path):
 
 
 @pytest.mark.parametrize("header", ["stretch,stress [kPa]", "lambda [-],shear stress [kPa]"])
-@pytest.mark.parametrize("low", [0.0, -0.1])
-def test_an_amount_of_shear_under_the_name_of_a_stretch_is_read_and_told(tmp_path, header, low):
-    file = shear_file(tmp_path, header, [(low, 15 * low), (0.1, 1.5), (0.5, 7.5), (1.2, 18.0)])
+def test_an_amount_of_shear_under_the_name_of_a_stretch_is_read_and_told(tmp_path, header):
+    file = shear_file(tmp_path, header, [(0.0, 0.0), (0.1, 1.5), (0.5, 7.5), (1.2, 18.0)])
     with pytest.warns(UserWarning, match=r"check the column: .* was taken for the amount of shear") as told:
         data = read_experiment(file, mode="simple-shear")
-    assert data.stretch.tolist() == [low, 0.1, 0.5, 1.2]
+    assert data.stretch.tolist() == [0.0, 0.1, 0.5, 1.2]
     name = header.split(",")[0]
     assert f"--column shear='{name}'" in str(told[0].message)
     said = read_experiment(file, mode="simple-shear", columns={"shear": name})
     assert said.stretch.tolist() == data.stretch.tolist()
+
+
+@pytest.mark.filterwarnings("error")
+def test_negative_amounts_of_shear_are_no_stretches_and_read_without_a_doubt(tmp_path):
+    file = shear_file(tmp_path, "stretch,stress [kPa]", [(-0.1, -1.5), (0.1, 1.5), (0.5, 7.5), (1.2, 18.0)])
+    assert read_experiment(file, mode="simple-shear").stretch.tolist() == [-0.1, 0.1, 0.5, 1.2]
 
 
 def test_a_true_stretch_is_not_taken_for_an_amount_of_shear(tmp_path):

@@ -149,6 +149,19 @@ def test_loading_and_unloading_are_read_out_apart(tmp_path):
         assert words in page.inner_text(READOUT)
 
 
+def test_a_mode_of_which_a_discrepancy_says_nothing_cannot_be_chosen_beside_it(of_one_test):
+    with opened(of_one_test) as page:
+        discrepancy, modes = page.locator("#chart select").nth(0), page.locator("#chart select").nth(1)
+        disabled = {}
+        for name in discrepancy.locator("option").all_inner_texts():
+            discrepancy.select_option(name)
+            disabled[name] = modes.locator("option[disabled]").all_inner_texts()
+        assert disabled["auto"] == []
+        (of_stress,) = set(disabled) - {"auto", "none", "yeoh"}
+        assert "planar (predicted)" in disabled[of_stress]
+        assert "uniaxial" not in disabled[of_stress]
+
+
 def test_parameters_that_are_moved_draw_the_material_alone(of_one_test):
     with opened(of_one_test) as page:
         page.fill(TYPED, "1.5")

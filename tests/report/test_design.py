@@ -12,7 +12,9 @@ import pytest
 import tissuq as tq
 from tissuq.next_test.candidates import target_named
 from tissuq.report.design import _best, design_figure, design_result, heading, readable_design
+from tissuq.report.result import Result
 from tissuq.report.writer import write_result
+from tissuq.result_warning import ResultWarning
 from tissuq.studies.design import DesignSettings, DesignStudy
 
 
@@ -46,12 +48,12 @@ def test_tests_that_are_not_told_apart_from_the_best_are_named_with_it(study):
                          (5, f" (not told apart from the best: {names[1]}, {names[2]} and 2 more)")):  # fmt: skip
         is_tied = new & (new.cumsum() <= count)
         number = _best(replace(study, table=study.table.assign(is_tied=is_tied)), study.targets[0])
-        assert f"%{words}; repeating the data" in number.remark
+        assert f" kPa{words}; repeating the data" in number.remark
 
 
 @pytest.mark.slow
 def test_everything_is_written(study, tmp_path):
-    write_result(design_result(study, study.settings), tmp_path)
+    write_result(design_result(study, study.settings, tmp_path / "run"), tmp_path)
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
     figures = {f"figures/{name}.{kind}" for name in ("answer", "design") for kind in ("svg", "png")}
     wanted = {"design.csv", "design.json", "run.toml", "report.html", "result.json"} | figures
@@ -70,8 +72,20 @@ def test_everything_is_written(study, tmp_path):
     assert "is expected to lower its sd by" in page
 
 
+def test_what_the_fit_says_of_its_measurements_comes_before_a_further_test(study, tmp_path):
+    assert design_result(study, study.settings, tmp_path).next_step.startswith("make the first of these tests")
+    said = Result(
+        command="fit", title="a fit", subject="", numbers=(), finding="", next_step="fit again.",
+        warnings=(ResultWarning("it tore.", "measurements"), ResultWarning("few.", "few-measurements")),
+    )  # fmt: skip
+    write_result(said, tmp_path, figures=False)
+    result = design_result(study, study.settings, tmp_path)
+    assert result.next_step.startswith("see to the first warning before")
+    assert [warning for warning in result.warnings if "tore" in warning or "few" in warning] == ["it tore."]
+
+
 def test_without_figures_there_are_none(study, tmp_path):
-    write_result(design_result(study, study.settings), tmp_path, figures=False)
+    write_result(design_result(study, study.settings, tmp_path / "run"), tmp_path, figures=False)
     assert not (tmp_path / "figures").exists()
     assert "<img" not in (tmp_path / "report.html").read_text()
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.report import population
 from tissuq.report.methods import methods_section
 from tissuq.report.result import Table
 from tissuq.report.specimen import _of_what, specimen_answer, specimen_result
@@ -119,3 +120,19 @@ def test_intervals_that_are_not_of_the_same_are_said_to_be_so():
     assert "those of none are of this specimen, errors of the test included" in words
     assert "those of constant are of this specimen as tested" in words
     assert _of_what(SimpleNamespace(posteriors={"none": fits["none"]})) == ""
+
+
+def test_a_population_says_how_far_the_law_alone_is_from_its_specimens(monkeypatch):
+    solutions = {
+        name: SimpleNamespace(model=None, share=share) for name, share in zip("abc", (0.1, 0.4, 0.6), strict=True)
+    }
+    monkeypatch.setattr(population, "has_energy", lambda model: True)
+    monkeypatch.setattr(population, "shares_of_discrepancy", lambda solution: ((solution.share, 0.0, 1.0), None))
+    material = SimpleNamespace(material=SimpleNamespace(name="demiray"))
+    pooled = SimpleNamespace(
+        posteriors={name: SimpleNamespace(solution=solution) for name, solution in solutions.items()},
+        complete=SimpleNamespace(model=material),
+    )
+    assert "demiray alone is wrong here: the discrepancy carries 40% of the stress" in population._about_law(pooled)
+    solutions["b"].share = 0.15
+    assert population._about_law(pooled) == ""

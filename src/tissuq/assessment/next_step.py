@@ -45,6 +45,10 @@ STEPS: Mapping[str, Step] = {
         "measure at more stretches, from near rest onward: posterior.design() says which.",
     ),
     "specimens": Step(*["measure further specimens: how much they differ is assumed so far, and sets the width."] * 2),
+    "unnamed specimens": Step(
+        "if the tests are of one specimen, say so: fit again with --specimen NAME once for each; if not, measure more.",
+        'if the tests are of one specimen, say so: tq.Experiment(..., specimen="NAME"); if not, measure more.',
+    ),
     "law": Step(
         "see whether another law describes the measurements by itself: fit again with --material all.",
         "see whether another law describes the measurements by itself: tq.fit_laws.",
@@ -110,7 +114,7 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
         return STEPS["fibres"]
     if reporting is not Verdict.YES:
         if SPREAD in uses[0].reason:
-            return STEPS["specimens"]
+            return STEPS["specimens" if all(test.specimen for test in model.experiment.tests) else "unnamed specimens"]
         is_law_wrong = model.material.is_isotropic and shares_of_discrepancy(solution)[0][0] > PRECISE
         return STEPS["law" if is_law_wrong else "design"]
     if others is not Verdict.YES and len(model.experiment.modes) == 1:

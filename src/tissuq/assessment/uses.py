@@ -109,10 +109,11 @@ def _reporting(
     if "not-near-reference" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
     if "measurements" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, but see the warning about the measurements"
+        return _worst(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
-        error = f"assumed error of load and area (tolerance 'stress', {100 * model.common_error:.0f} %)"
+        names = " and ".join(f"'{error.name}'" for error, _ in model.tolerances if error.name in ("stress", "test"))
+        error = f"assumed error of load and area (tolerance {names}, {100 * model.common_error:.0f} %)"
         unnamed = " (each test without the name of one counts as a specimen)"
         spread = SPREAD + unnamed * (not all(test.specimen for test in model.experiment.tests))
         common = spread if model.tolerances.estimand == TISSUE else error

@@ -46,5 +46,5 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     call.carried_out(
         target,
         lambda step: run_design(settings, call.beside, step, call.law),
-        partial(design_result, recipe=recipe),
+        partial(design_result, recipe=recipe, run=run),
     )

@@ -116,7 +116,7 @@ class ScaleError(MeasurementError):
     """Of the stress as a whole: area, thickness, load cell, and how much one specimen is stiffer than another."""
 
     name = "stress"
-    description = "of the stress (spread between specimens)"
+    description = "of the stress of a specimen (its area, and how specimens differ)"
     shared = "specimens' differences"
 
     def effect(self, points: ErrorPoints) -> Any:
@@ -127,7 +127,7 @@ class TestError(MeasurementError):
     """Of the stress of one test as a whole: grips, friction, glue, order of the tests, another mode or direction."""
 
     name = "test"
-    description = "of the stress (spread between tests of a specimen)"
+    description = "of the stress of a test (its load, and how tests of a specimen differ)"
     shared = "tests' differences"
 
     def effect(self, points: ErrorPoints) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, as_completed
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
@@ -281,7 +281,7 @@ def fit_laws(
     priors : mapping of str to Prior, optional
         By parameter; a law takes those of its own.
     step : callable
-        Is told the name of each law before it is fitted, or waited for.
+        Is told the name of each law before it is fitted, or how many of those in the pool are done.
     pool : Executor, optional
         Processes among which the laws are divided, such as ``concurrent.futures.ProcessPoolExecutor(2)``; laws and
         options must then be such as can be sent to them.
@@ -325,9 +325,15 @@ def fit_laws(
     futures = dict[str, Future[LawFit]]()
     if pool is not None:  # the laws of most parameters, which take longest, begin
         futures = {name: pool.submit(tasks[name]) for name in reversed(tasks)}
+        step(f"0 of {len(futures)} laws")
+    for done, future in enumerate(as_completed(futures.values()), 1):
+        step(f"{done} of {len(futures)} laws")
+        if not is_all and future.exception():
+            break
     fits = dict[str, LawFit]()
-    for name, task in tasks.items():
-        step(name)
+    for number, (name, task) in enumerate(tasks.items(), 1):
+        if not futures:
+            step(f"law {number} of {len(tasks)}: {name}")
         try:
             fits[name] = futures[name].result() if futures else task()
         except (ConvergenceError, ModelError, InputError) as error:

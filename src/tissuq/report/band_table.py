@@ -112,7 +112,10 @@ def largest_share(row: Mapping[str, Any], names: Collection[str], of: str = "the
     if len(known) < 2:
         return []
     largest = max(known, key=lambda name: float(row[name]))
-    return [Number("uncertain mostly by", LABELS[largest], remark=f"{share_cell(row, largest)} of {of}")]
+    remark = f"{share_cell(row, largest)} of {of}"
+    if row[largest] > 1:
+        remark = "part of which another source takes back: what they do together is the band"
+    return [Number("uncertain mostly by", LABELS[largest], remark=remark)]
 
 
 def mesh_change(row: Mapping[str, Any]) -> str:

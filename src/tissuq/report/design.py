@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.candidates import Target
 from tissuq.next_test.ranking import TIED
 from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.source_run import said_by
 from tissuq.report.tables import Row, significant
 from tissuq.studies.design import DesignSettings, DesignStudy
 
@@ -37,13 +39,14 @@ CAPTION = (
     "Expected standard deviation after each test, the best on top. Lines reach from it to the standard deviation now; "
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
 )
+AFTER_WARNING = "see to the first warning before, as the ranking takes the measurements for right. Then"
 NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{options}"
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")
 """Columns in the unit of a target."""
 
 
-def _next_step(study: DesignStudy) -> str:
+def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     """Return what to do, with the estimand for which the expected reduction holds, and the modes of both files."""
     model, is_other = study.posterior.model, study.specimen == "other"
     tolerances, tests = model.tolerances, model.experiment.tests
@@ -54,7 +57,8 @@ def _next_step(study: DesignStudy) -> str:
     errors += "".join(f" --tolerance {name}={size:g}" for name, size in stated.items())
     best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
-    return NEXT.format(whose=" on another specimen" * is_other, options=modes + errors)
+    test = NEXT.format(whose=" on another specimen" * is_other, options=modes + errors)
+    return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
 
 def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
@@ -100,7 +104,7 @@ def _figure(study: DesignStudy, targets: Sequence[Target], most: int, width: flo
     return figure
 
 
-def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
+def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Result:
     """Return what a ranking of tests says.
 
     Standard deviations are in the unit of the data, which stands beside each.
@@ -110,7 +114,10 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
     study : DesignStudy
     recipe : DesignSettings
         The settings, with the run as it is seen from the folder.
+    run : Path
+        Where it lies.
     """
+    said = said_by(run)
     rows, model = _rows_in_unit(study), study.posterior.model
     every = Picture("design", lambda: design_figure(study), "Expected standard deviations after each test", CAPTION)
     how_to_read = (
@@ -125,7 +132,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
         subject=f"{model.experiment.name} · {model.material.name}, discrepancy {model.discrepancy.name}",
         numbers=tuple(best[:MAX_TARGETS]),
         finding=" ".join(_sentences(study)[MAX_TARGETS:]),
-        next_step=_next_step(study) if best else "",
+        next_step=_next_step(study, bool(said.warnings)) if best else "",
         picture=Picture(
             "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
             "Expected standard deviation after the best tests", "Expected standard deviation after a test; line: now."
@@ -136,7 +143,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
             for target in study.targets
         ),
         sections=(Section("Every test", (tuple(_sentences(study)), every)), Section("How to read it", (how_to_read,))),
-        warnings=tuple(study.warnings),
+        warnings=(*said.warnings, *study.warnings),
         files={"design.csv": rows, "design.json": rows},
         recipe=recipe,
     )  # fmt: skip
@@ -180,7 +187,9 @@ def _best(study: DesignStudy, target: Target) -> Number | None:
     if not len(best):
         return None
     row = best.iloc[0]
-    remark = f"lowers its sd by {row['reduction']:.0%}{_tied(best)}"
+    factor, unit = _unit(study, target)
+    after = f"{significant(row['sd_after'] / factor)}{' ' * bool(unit)}{unit}"
+    remark = f"lowers its sd by {row['reduction']:.0%}, to {after}{_tied(best)}"
     if len(again):
         remark += f"; repeating the data, by {again.iloc[-1]['reduction']:.0%}"
     return Number(f"For {target.title(study.posterior.model)}:", str(row["candidate"]), remark=remark)
@@ -240,5 +249,5 @@ def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) 
     axis.locator_params(axis="x", nbins=4)
     axis.xaxis.set_major_formatter("{x:.3g}")
     axis.set_title(target.title(study.posterior.model))
-    axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}\n(line: now)")
+    axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}\n(line: now)", loc="right")
     axis.tick_params(axis="y", length=0)

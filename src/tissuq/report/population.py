@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.assessment.extent import has_energy, shares_of_discrepancy
+from tissuq.assessment.uses import PRECISE
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.population.picture import numbers_of
@@ -356,5 +358,18 @@ def _lead(study: PopulationStudy) -> str:
     return (
         f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
-        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
+        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}{_about_law(study.population)}"
+    )
+
+
+def _about_law(population: Population) -> str:
+    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
+    solutions = [posterior.solution for posterior in population.posteriors.values()]
+    shares = [shares_of_discrepancy(solution)[0][0] for solution in solutions if has_energy(solution.model)]
+    if not shares or (share := float(np.median(shares))) <= PRECISE:
+        return ""
+    law, carried = population.complete.model.material.name, f"{share:.0%}" if share < 1 else "more than 100 %"
+    return (
+        f" {law} alone is wrong here: the discrepancy carries {carried} of the stress "
+        "(median of the specimens). Use it with the discrepancy, as exports do, or fit another law."
     )

@@ -171,7 +171,10 @@ def _next_step(prediction: Prediction, run: str) -> str:
     if prediction.posterior.solution.is_of_data and not prediction.is_calibrated.all():
         return f"see which test would make the extrapolated stress less uncertain: tissuq design {run}"
     if prediction.scores is None:
-        return f"compare with a measurement of this mode, if there is one: tissuq predict {run} --data FILE"
+        mode = prediction.mode.name
+        return (
+            f"compare with a measurement of this mode, if there is one: tissuq predict {run} --mode {mode} --data FILE"
+        )
     return "see which laws describe all tests together: tissuq fit FILES --material LAW --material OTHER"
 
 

@@ -2,7 +2,7 @@
 
 A study becomes a result by one function, such as `design_result`, and is then written, printed and shown the same way::
 
-    result = design_result(study, recipe)
+    result = design_result(study, recipe, run)
     with run_folder(target, "design") as folder:
         write_result(result, folder, figures=figures)    # tables, figures, run.toml, result.json, report.html
     print_result(result.record(), target)                # what `tissuq show target` prints, too

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.assessment.uses import Verdict
 from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
@@ -39,6 +40,7 @@ from tissuq.report.simulation_figures import (
     write_collection,
     write_vtu,
 )
+from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import known_number, significant
 from tissuq.studies.structure import SimulationStudy
 
@@ -65,7 +67,7 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
     table = simulation.table()
     (folder / "failures.csv").unlink(missing_ok=True)
     failures = [vars(failure) for failure in simulation.failures]
-    case = simulation.case
+    case, said = simulation.case, said_by(run)
     headers, rows = readable_forces(study)
     percent = percent_of(table["draws"].max())
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
@@ -87,11 +89,12 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
         f"{model.discrepancy.name} · {_completed(simulation)}",
         numbers=_numbers(study, table),
         finding=_lead(simulation, table),
-        next_step=_next_step(simulation, shlex.quote(os.path.normpath(run))),
+        uses=(said.use,) if said.use else (),
+        next_step=_next_step(simulation, said, shlex.quote(os.path.normpath(run))),
         picture=Picture("answer", lambda: force_figure(simulation, table), f"Band of the {case.response}", caption),
         tables=(Table(headers, rows, titled, note=_of_cells(simulation, table).strip()),),
         sections=_sections(study, table),
-        warnings=tuple(study.warnings),
+        warnings=(*said.warnings, *study.warnings),
         files=files | ({"failures.csv": failures} if failures else {}),
     )
 
@@ -136,7 +139,9 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     return tuple(numbers)
 
 
-def _next_step(simulation: Simulation, run: str) -> str:
+def _next_step(simulation: Simulation, said: Said, run: str) -> str:
+    if said.use and said.use.verdict is Verdict.NO:
+        return f"do not use this yet, as the fit says: {said.next_step}"
     is_of_tests = not simulation.ensembles[COMPLETE].origin
     if is_of_tests and (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
         return f"measure up to the strains of the body: tissuq design {run} says which test helps most"

@@ -1,21 +1,69 @@
-"""Copies of the files of a run that a posterior comes from, in the folder of what was computed with it."""
+"""The run that a posterior comes from: copies of its files where it was used, and what it says against that use."""
 
 from __future__ import annotations
 
 import filecmp
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.errors import InputError
 from tissuq.finite_elements.body_from_file import BodyFromFile
 from tissuq.finite_elements.case import Case
+from tissuq.report.result import RESULT
 from tissuq.report.run_folder import INPUT, RECIPE
+from tissuq.report.writer import read_record
+from tissuq.result_warning import ResultWarning, Severity
 from tissuq.studies.earlier_run import POSTERIORS
 
-__all__ = ["SOURCE", "check_mesh", "check_source", "copy_mesh", "copy_source", "stored_mesh"]
+__all__ = ["SOURCE", "Said", "check_mesh", "check_source", "copy_mesh", "copy_source", "said_by", "stored_mesh"]
 
 SOURCE = "source"
 """The folder with the copies."""
+SPOILING = ("not-converged", "doubtful-reading", "stress-at-rest", "tests-apart", "contradicting-tests",
+            "unmodelled-curve", "measurements")  # fmt: skip
+"""Codes of warnings about what a fit says of the tissue, and not about how exactly."""
+SIMULATING, USE_OF_FIT = "simulate with finite elements", "use of the fit in finite elements"
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a fit says to whatever is computed with it.
+
+    Attributes
+    ----------
+    use : Use or None
+        Whether it serves finite elements; None where it says nothing, as a population does.
+    warnings : tuple of ResultWarning
+        Those that hold for it, too.
+    next_step : str
+    """
+
+    use: Use | None = None
+    warnings: tuple[ResultWarning, ...] = ()
+    next_step: str = ""
+
+
+def said_by(run: Path) -> Said:
+    """Return what a run folder says; nothing where there is no result in it.
+
+    Raises
+    ------
+    InputError
+        When its result is damaged.
+    """
+    if not (run / RESULT).is_file():
+        return Said()
+    record = read_record(run)
+    uses = [use for use in record["uses"] if use["purpose"].startswith(SIMULATING)]
+    warnings = [
+        ResultWarning(warning["text"], warning["code"], Severity(warning["severity"]))
+        for warning in record["warnings"]
+        if warning["code"] in SPOILING and warning["severity"] != Severity.NOTE
+    ]
+    use = Use(USE_OF_FIT, Verdict(uses[0]["verdict"]), uses[0]["reason"]) if uses else None
+    return Said(use, tuple(warnings), record["next"])
 
 
 def check_source(run: Path, folder: Path) -> None:

@@ -54,9 +54,9 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
         )
     for choice in choices:
         roles = {choice.deformation: choice.measure, choice.stress: choice.load}
-        sentences += [_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit]
+        names = (_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit)
         corrections = (_about_correction(measured.table, column, role) for column, role in roles.items())
-        sentences += filter(None, corrections)
+        sentences += filter(None, (*names, *corrections))
     if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
         sentences += [_about_rim(name) for name in measured.table.names if is_torque(name)]
     if ZERO_ASSUMED in source:
@@ -78,6 +78,8 @@ def _about_correction(table: Table, column: int, role: str) -> str:
 def _about_name(measured: MeasuredRows, column: int, role: str) -> str:
     label, taken = measured.table.label(column), f"{role} by its unit alone, for its name is not known"
     if role == "shear":
+        if measured.stretch.min() < 0:
+            return ""  # as no stretch is
         taken = "amount of shear, because the mode is simple shear and its values begin at 0, as no stretch does"
     return (
         f"{DOUBTFUL_COLUMN} {label} was taken for the {taken}. If it is, "

@@ -41,6 +41,8 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 SAME_RATIO = np.radians(5.0)
 """Angle between the strains of two axes within which cycles have the same ratio of them."""
+SAME_PEAK = 0.02
+"""Difference of the deformations at the peaks of cycles, over the range of the test, within which these are equal."""
 MIN_CONTRACTION = 0.2
 """Smallest strain across over that along the axis, of the other sign, of a specimen that is free there: 0.5 of an
 isotropic one."""
@@ -103,12 +105,24 @@ def _cycles(reading: Reading, number: int) -> str:
             "of those with the same ratio, give --leave-out with their lines."
         )
     numbered = advice_on_numbered_tests(reading.table, reading.choices, reading.recorded.course)
+    seen = f"all {count} cycles are used{_change_of_peaks(reading, number)}"
+    advice = "to fit one, give --cycle last, first or a number"
     if share := _hysteresis_share(reading, number):
-        seen = f"all {count} cycles are used, and {HYSTERESIS.format(share=share)}"
+        seen += f", and {HYSTERESIS.format(share=share)}"
         advice = "to fit one branch of one cycle, give --cycle last --branch loading"
-    else:
-        seen, advice = f"all {count} cycles are used", "to fit one, give --cycle last, first or a number"
     return f"{seen}; {'; '.join(filter(None, (advice, numbered)))}."
+
+
+def _change_of_peaks(reading: Reading, number: int) -> str:
+    """Return by how much the stress at the peaks of equal cycles changes, as a clause; nothing where it hardly does."""
+    peaks = [cycle.peak for cycle in reading.used_cycles]
+    reached, stress = reading.used.course[peaks], reading.used.stress[number][peaks]
+    largest = float(np.abs(reading.used.stress[number]).max())
+    change = (abs(stress[-1]) - abs(stress[0])) / max(largest, np.finfo(float).tiny)
+    if np.ptp(reached) > SAME_PEAK * np.ptp(reading.used.course) or abs(change) < NOTABLE_SHARE:
+        return ""
+    how = "falls" if change < 0 else "rises"
+    return f", at whose peaks the stress {how} by {abs(change):.0%} of the largest from the first to the last"
 
 
 def _has_cycles(reading: Reading) -> bool:

@@ -207,8 +207,14 @@
     });
     chart.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
   };
+  const of = item => !formulation || item.formulation === formulation.value;
+  // Modes of which a discrepancy says nothing cannot be chosen beside it.
+  const restrict = () => {
+    const known = new Set(data.views.filter(of).map(item => item.test));
+    for (const option of stress ? stress.options : []) option.disabled = !known.has(Number(option.value));
+  };
   const pick = () => {
-    const of = item => !formulation || item.formulation === formulation.value;
+    restrict();
     view = data.views.find(item => of(item) && (!stress || item.test === Number(stress.value))) || data.views.find(of);
     test = data.tests[view.test];
     if (stress) stress.value = view.test;
@@ -271,6 +277,7 @@
   };
   holder.hidden = false;
   still.classList.add("print-only");
+  restrict();
   draw();
   addEventListener("resize", () => draw());
 })();
