@@ -28,16 +28,16 @@ def variants(base: type[T]) -> dict[str, type[T]]:
     ModelError
         When two different classes have the same name.
     """
-    found: dict[str, type[T]] = {}
+    classes: dict[str, type[T]] = {}
     for subclass in _descendants(base):
         name = vars(subclass)["name"]
-        if name in found and _origin(found[name]) != _origin(subclass):
+        if name in classes and _origin(classes[name]) != _origin(subclass):
             raise ModelError(
-                f"two classes are named '{name}': {' and '.join(map(_origin, (found[name], subclass)))}. "
+                f"two classes are named '{name}': {' and '.join(map(_origin, (classes[name], subclass)))}. "
                 "Give yours another name."
             )
-        found[name] = subclass
-    return found
+        classes[name] = subclass
+    return classes
 
 
 def _descendants(base: type[T]) -> Iterator[type[T]]:
@@ -53,16 +53,16 @@ def _origin(kind: type) -> str:
 
 def find(base: type[T], kind: str, name: str, error: type[TissuqError]) -> type[T]:
     """Return the variant of that name, or raise ``error`` that lists the names there are."""
-    known = variants(base)
-    if name in known:
-        return known[name]
+    classes = variants(base)
+    if name in classes:
+        return classes[name]
     for plugin in plugins(base, str(name)):
         return plugin
     text = str(name).lower()
-    family = [full for full in known if text and full.startswith(f"{text}-")]
-    close = family or get_close_matches(text, known, n=1)
+    family = [full for full in classes if text and full.startswith(f"{text}-")]
+    close = family or get_close_matches(text, classes, n=1)
     hint = f" Did you mean {' or '.join(map(repr, close))}?" if close else ""
-    raise error(f"there is no {kind} named '{name}'.{hint} Choose one of: {', '.join(known)}.")
+    raise error(f"there is no {kind} named '{name}'.{hint} Choose one of: {', '.join(classes)}.")
 
 
 def plugins(base: type[T], name: str | None = None) -> list[type[T]]:

@@ -145,8 +145,8 @@ def merged(
             concerned.setdefault((warning.code, NUMBER.sub("", warning)), []).append((name, warning))
     texts = []
     for group in concerned.values():
-        names, (warning, *others) = dict.fromkeys(name for name, _ in group), [of_name for _, of_name in group]
-        if any(other != warning for other in others):
+        names, (warning, *repeats) = dict.fromkeys(name for name, _ in group), [of_name for _, of_name in group]
+        if any(repeated != warning for repeated in repeats):
             warning = warning.with_end(" (The numbers are those of the first.)")
         if named or len(warnings) > 1:
             warning = warning.of([everyone] if everyone and len(names) == len(warnings) else names)
@@ -157,5 +157,5 @@ def merged(
 def most_severe_first(warnings: Iterable[str]) -> list[ResultWarning]:
     """Return warnings by severity, then as their codes matter; plain sentences are cautions about the measurements."""
     severities, codes = list(Severity), list(WARNING_CODES)
-    known = [text if isinstance(text, ResultWarning) else ResultWarning(text) for text in warnings]
-    return sorted(known, key=lambda warning: (severities.index(warning.severity), codes.index(warning.code)))
+    coded = [text if isinstance(text, ResultWarning) else ResultWarning(text) for text in warnings]
+    return sorted(coded, key=lambda warning: (severities.index(warning.severity), codes.index(warning.code)))

@@ -27,7 +27,7 @@ def test_two_controls_follow_a_path_until_the_test_goes_back():
     first, second = np.column_stack([up, up]), np.column_stack([up, 1 + 0.5 * (up - 1)])
     points = np.concatenate([first, second])
     ways = ways_of(BIAXIAL, points, points[:, 0])
-    assert [way.places.tolist() for way in ways] == [list(range(8)), list(range(8, 16))]
+    assert [way.indices.tolist() for way in ways] == [list(range(8)), list(range(8, 16))]
     assert all(way.is_curve for way in ways)
 
 
@@ -41,4 +41,4 @@ def test_two_controls_follow_a_path_until_the_test_goes_back():
 def test_points_that_follow_no_path_are_drawn_by_themselves(points):
     ways = ways_of(BIAXIAL, points, points[:, 0])
     assert not any(way.is_curve for way in ways)
-    assert sorted(np.concatenate([way.places for way in ways])) == list(range(len(points)))
+    assert sorted(np.concatenate([way.indices for way in ways])) == list(range(len(points)))

@@ -66,35 +66,35 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
     tables = {file: list(map(_table, tables_of(Path(file), reading))) for file in files}
     columns = list(dict.fromkeys(column["name"] for of_file in tables.values() for table in of_file
                                  for column in table["columns"]))  # fmt: skip
-    found: dict[str, Any] = {"tables": tables, "text": "", "tests": [], "findings": [], "questions": [], "error": None}
+    record: dict[str, Any] = {"tables": tables, "text": "", "tests": [], "findings": [], "questions": [], "error": None}
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path, mode in zip(paths, modes, strict=True):
         try:
             tests += find_tests(path, {**reading, "mode": mode}, is_only_file=len(files) == 1)
         except TissuqError as refusal:
             settings, start = {**reading, "mode": mode}, perf_counter()
-            asked = _question(path, str(refusal), columns, settings, len(files), start, refused=True)
-            found["error"] = asked | {"file": str(path)}
+            doubt = _question(path, str(refusal), columns, settings, len(files), start, refused=True)
+            record["error"] = doubt | {"file": str(path)}
             break
     start = perf_counter()
-    if tests and not found["error"]:
+    if tests and not record["error"]:
         inspections = [Inspection.of(of_test) for _, of_test in tests]
-        found["text"] = str(inspections[0]) if len(tests) == 1 else overview(inspections)
+        record["text"] = str(inspections[0]) if len(tests) == 1 else overview(inspections)
         pairs = zip(tests, inspections, strict=True)
-        found["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
+        record["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
         texts = dict.fromkeys(text for inspection in inspections for text in inspection.warnings)
-        found["findings"] = [_finding(text, columns, reading) for text in texts]
+        record["findings"] = [_finding(text, columns, reading) for text in texts]
         for (settings, of_test), mode in zip(tests, _modes_of(tests, files, modes), strict=True):
             path = Path(settings["file"])
             for text in of_test.doubts:
-                if text not in [question["text"] for question in found["questions"]]:
-                    asked = _question(path, text, columns, {**reading, "mode": mode}, len(files), start)
-                    found["questions"] += [asked | {"file": str(path)}] if asked["answers"] else []
+                if text not in [question["text"] for question in record["questions"]]:
+                    doubt = _question(path, text, columns, {**reading, "mode": mode}, len(files), start)
+                    record["questions"] += [doubt | {"file": str(path)}] if doubt["answers"] else []
         silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
         if silent:
             answers = [_plain_mode(name, kind.description) for name, kind in loading_modes().items()]
-            found["questions"].append({"text": MODE, "plain": MODE, "answers": answers, "shown": 1, "file": silent[0]})
-    return found
+            record["questions"].append({"text": MODE, "plain": MODE, "answers": answers, "shown": 1, "file": silent[0]})
+    return record
 
 
 def _modes_of(
@@ -222,15 +222,15 @@ def _without_options(text: str) -> str:
     """
     text = re.sub(r" \([^()]*--[^()]*\)", "", text)
     clauses = re.split(r"(?<=[;.:]) ", text)
-    first = next((number for number, clause in enumerate(clauses) if "--" in clause), len(clauses))
-    while first and clauses[first - 1].endswith(":") and first < len(clauses):
-        first -= 1
-    plain = " ".join(clauses[:first]).rstrip(";: ")
+    end = next((number for number, clause in enumerate(clauses) if "--" in clause), len(clauses))
+    while end and clauses[end - 1].endswith(":") and end < len(clauses):
+        end -= 1
+    plain = " ".join(clauses[:end]).rstrip(";: ")
     return text if len(plain) < MIN_LETTERS else plain if plain.endswith(".") else f"{plain}."
 
 
-def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in after.items() if before.get(name) != value}
+def _changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in new.items() if old.get(name) != value}
 
 
 def _in_words(proposal: Answer) -> str:

@@ -72,8 +72,8 @@ class Guard:
         origin = headers.get("origin")
         if origin is not None and origin.removeprefix("http://") not in self.hosts:
             return "Another page must not talk to this one."
-        first = str(scope["path"]).removeprefix("/").partition("/")[0]
-        return "" if compare_digest(first.encode(), self.token.encode()) else WRONG_ADDRESS
+        token = str(scope["path"]).removeprefix("/").partition("/")[0]
+        return "" if compare_digest(token.encode(), self.token.encode()) else WRONG_ADDRESS
 
     @staticmethod
     def _with_headers(send: Send) -> Send:

@@ -30,14 +30,14 @@ def command(verb: str, words: Iterable[str], options: Mapping[str, Any]) -> str:
     >>> command("fit", ["a b.csv"], {"mode": "uniaxial", "discrepancies": ["none"], "estimand": None})
     "tissuq fit 'a b.csv' --mode uniaxial --discrepancy none"
     """
-    parts = ["tissuq", verb, *words]
+    tokens = ["tissuq", verb, *words]
     for name, value in options.items():
         option = f"--{IN_SHELL.get(name, name).replace('_', '-')}"
         values = value if isinstance(value, list | tuple) else [value]
         for item in values:
             if item is not None and item is not False and item != "":
-                parts += [option] if item is True else [option, f"{item}"]
-    return shlex.join(parts)
+                tokens += [option] if item is True else [option, f"{item}"]
+    return shlex.join(tokens)
 
 
 def reading_words(reading: Mapping[str, Any]) -> list[str]:

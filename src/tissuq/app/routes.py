@@ -105,15 +105,15 @@ async def _begin(request: Request, sessions: Sessions) -> Response:
         if len(body) > MAX_REQUEST:
             return JSONResponse({"error": "the request is too large."}, 413)
     try:
-        asked: Any = json.loads(body or b"{}")
+        values: Any = json.loads(body or b"{}")
     except ValueError:
-        asked = None
-    if task not in TASKS or not isinstance(asked, dict):
+        values = None
+    if task not in TASKS or not isinstance(values, dict):
         return JSONResponse({"error": f"there is no task '{task}' with such values."}, 400)
-    files = asked.get("files", [])
+    files = values.get("files", [])
     if not isinstance(files, list) or not set(map(_file_of, files)) <= set(session.files):
         return JSONResponse({"error": "one of these files is not here any more: drop it again."}, 400)
-    return JSONResponse({"task": session.begin(sessions.workers, task, asked)})
+    return JSONResponse({"task": session.begin(sessions.workers, task, values)})
 
 
 def _file_of(name: Any) -> str:
@@ -172,5 +172,5 @@ async def _zip(request: Request, sessions: Sessions) -> Response:
         return JSONResponse({"error": "that is no folder of a result."}, 400)
     archive = sessions.folder / f"{token_urlsafe(12)}.zip"  # beside the session, whose files are counted
     await asyncio.to_thread(shutil.make_archive, str(archive.with_suffix("")), "zip", folder.parent, folder.name)
-    after = BackgroundTask(archive.unlink, missing_ok=True)
-    return FileResponse(archive, media_type="application/zip", filename=f"{folder.name}.zip", background=after)
+    removal = BackgroundTask(archive.unlink, missing_ok=True)
+    return FileResponse(archive, media_type="application/zip", filename=f"{folder.name}.zip", background=removal)

@@ -34,11 +34,11 @@ class _Server(uvicorn.Server):
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
         """End on signals; Uvicorn would raise them anew, and so end the process at once."""
-        before = {number: signal.signal(number, self.handle_exit) for number in ENDING}
+        handlers = {number: signal.signal(number, self.handle_exit) for number in ENDING}
         try:
             yield
         finally:
-            for number, handler in before.items():
+            for number, handler in handlers.items():
                 signal.signal(number, handler)
 
 

@@ -52,12 +52,12 @@ def inspect(request: Mapping[str, Any], say: Say) -> None:
     from tissuq.app.account import account
 
     files, modes, reading = _files(request)
-    found = account(files, reading, [mode or None for mode in modes or [""] * len(files)])
+    record = account(files, reading, [mode or None for mode in modes or [""] * len(files)])
     options = f", {', '.join(f'{name}={value!r}' for name, value in reading.items())}" if reading else ""
     of_files = [f", mode={mode!r}" if mode else "" for mode in modes or [""] * len(files)]
     prints = [f"print(tq.inspect({file!r}{options}{mode}))" for file, mode in zip(files, of_files, strict=True)]
     lines = "\n".join(["import tissuq as tq", "", *prints])
-    say("done", found | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
+    say("done", record | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
 
 
 def fit(request: Mapping[str, Any], say: Say) -> None:
@@ -70,7 +70,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
     from tissuq.studies.specimen_settings import SpecimenSettings
 
     say("step", "reading")
-    values, found, name = _measured(request)
+    values, readings, name = _measured(request)
     options = _options(request, ("material", "discrepancies", "noise_sd", "estimand", "stable_in"))
     settings = _settings(SpecimenSettings, values | options)
     shell = _shell("fit", *_files(request), options)
@@ -89,7 +89,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
         }
         say("answer", {**record, **of_page})
 
-    study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=found, early=say_answer)
+    study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=readings, early=say_answer)
     say("step", "writing the report")
     with run_folder(RUNS / name, "fit", force=True) as folder:
         write_result(specimen_result(study, _sources(settings)), folder)
@@ -106,10 +106,10 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     from tissuq.studies.specimen_settings import LawSettings
 
     say("step", "reading")
-    values, found, name = _measured(request)
+    values, readings, name = _measured(request)
     options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand"))
     settings = _settings(LawSettings, values | options)
-    study = run_laws(settings, Path(), lambda text: say("step", text), found=found)
+    study = run_laws(settings, Path(), lambda text: say("step", text), found=readings)
     folder_name = f"{name}-laws"
     say("step", "writing the report")
     with run_folder(RUNS / folder_name, "fit", force=True) as folder:
@@ -234,10 +234,10 @@ def _measured(request: Mapping[str, Any]) -> tuple[dict[str, Any], Sequence[Any]
     """Return the settings that say what was measured, what was read, and the name of the run."""
     files, modes, reading = _files(request)
     paths = list(map(Path, files))
-    values, found = measured(paths, reading, modes or None, None, None)
+    values, readings = measured(paths, reading, modes or None, None, None)
     values = {name: value for name, value in values.items() if value is not None}
     sources = [Path(test["file"]) for test in values.get("tests") or [values]]
-    return values, found, run_name(paths, None, sources)
+    return values, readings, run_name(paths, None, sources)
 
 
 def _options(request: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:

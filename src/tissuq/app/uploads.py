@@ -53,8 +53,8 @@ async def store(chunks: AsyncIterator[bytes], name: str, folder: Path) -> str:
     InputError
         When it is empty, too large, or there are too many; nothing of it is then left.
     """
-    before = [path.stat().st_size for path in folder.iterdir() if path.is_file()]
-    if len(before) >= MAX_FILES:
+    sizes = [path.stat().st_size for path in folder.iterdir() if path.is_file()]
+    if len(sizes) >= MAX_FILES:
         raise InputError(f"there are {MAX_FILES} files already: remove some, or use 'tissuq fit' for so many.")
     target = folder / free_name(harmless_name(name), folder)
     size = 0
@@ -62,7 +62,7 @@ async def store(chunks: AsyncIterator[bytes], name: str, folder: Path) -> str:
         with target.open("xb") as file:
             async for chunk in chunks:
                 size += len(chunk)
-                if size > MAX_FILE or size + sum(before) > MAX_TOTAL:
+                if size > MAX_FILE or size + sum(sizes) > MAX_TOTAL:
                     limit = f"{MAX_FILE // MEGABYTE} MB" if size > MAX_FILE else f"all {MAX_TOTAL // MEGABYTE} MB"
                     raise InputError(
                         f"'{target.name}' is too large for this page ({limit} at most). Take fewer rows, or use the "

@@ -34,11 +34,11 @@ class _Process:
     """A process that does one task after another, and its end of the pipe."""
 
     def __init__(self, scratch: Path, *, is_light: bool) -> None:
-        self.connection, other = SPAWNED.Pipe()
-        self.process = SPAWNED.Process(target=_work, args=(other, scratch, is_light), daemon=True)
+        self.connection, child_end = SPAWNED.Pipe()
+        self.process = SPAWNED.Process(target=_work, args=(child_end, scratch, is_light), daemon=True)
         with _deaf_to_interrupts():
             self.process.start()
-        other.close()
+        child_end.close()
 
     def receive(self) -> News:
         """Return the next news; of a process that has ended, that it has."""
@@ -57,8 +57,8 @@ class _Process:
 class _Pool:
     """Processes of one kind: one from the start, further ones when all are busy."""
 
-    def __init__(self, scratch: Path, most: int, threads: ThreadPoolExecutor, *, is_light: bool) -> None:
-        self.scratch, self.most, self.is_light = scratch, most, is_light
+    def __init__(self, scratch: Path, limit: int, threads: ThreadPoolExecutor, *, is_light: bool) -> None:
+        self.scratch, self.limit, self.is_light = scratch, limit, is_light
         self.threads = threads
         self.has_ended = False
         self.idle: asyncio.Queue[_Process] = asyncio.Queue()
@@ -75,7 +75,7 @@ class _Pool:
         task.add_done_callback(self.starts.discard)
 
     async def run(self, message: Any, say: Callable[[News], None]) -> None:
-        if self.idle.empty() and self.busy == len(self.processes) < self.most:
+        if self.idle.empty() and self.busy == len(self.processes) < self.limit:
             self.start()
         process = await self.idle.get()
         self.busy += 1
@@ -129,10 +129,10 @@ class Workers:
     """
 
     def __init__(self, scratch: Path, fitting: int | None = None) -> None:
-        most = fitting or min(2, os.cpu_count() or 1)
-        self._threads = ThreadPoolExecutor(max_workers=most + 2, thread_name_prefix="news")
+        fitting_limit = fitting or min(2, os.cpu_count() or 1)
+        self._threads = ThreadPoolExecutor(max_workers=fitting_limit + 2, thread_name_prefix="news")
         self._light = _Pool(scratch, 1, self._threads, is_light=True)
-        self._heavy = _Pool(scratch, most, self._threads, is_light=False)
+        self._heavy = _Pool(scratch, fitting_limit, self._threads, is_light=False)
 
     async def start(self) -> None:
         """Start a process of each kind."""
@@ -154,11 +154,11 @@ class Workers:
 @contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
     """Ignore Ctrl-C for a moment: what is started then ignores it for good, for the page ends it."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, handler)
 
 
 def _work(connection: Any, scratch: Path, is_light: bool) -> None:

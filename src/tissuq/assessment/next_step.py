@@ -99,7 +99,7 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
     """Return the one thing to do next, the severest of the warnings first."""
     if any(warning.severity is Severity.PROBLEM for warning in warnings):
         return STEPS["problem"]
-    reporting, _, others, simulating = (use.verdict for use in uses)
+    reporting, _, predicting, simulating = (use.verdict for use in uses)
     model, verdicts = solution.model, list(Verdict)
     is_plain_law = solution.is_of_data and not model.energy_symbols and model.material.is_isotropic
     if is_plain_law and all(warning.code != "stress-at-rest" for warning in warnings):
@@ -117,7 +117,7 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
             return STEPS["specimens" if all(test.specimen for test in model.experiment.tests) else "unnamed specimens"]
         is_law_wrong = model.material.is_isotropic and shares_of_discrepancy(solution)[0][0] > PRECISE
         return STEPS["law" if is_law_wrong else "design"]
-    if others is not Verdict.YES and len(model.experiment.modes) == 1:
+    if predicting is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]
 

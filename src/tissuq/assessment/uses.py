@@ -158,8 +158,8 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
     if held < MIN_INSIDE * count:
         return Verdict.NO, f"only {counts}"
     names = [curve.name for curve in solution.model.experiment.curves]
-    where = f", worst in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
-    sentence = f"stress {width} on average where it was measured{where}; {counts}"
+    worst_test = f", worst in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
+    sentence = f"stress {width} on average where it was measured{worst_test}; {counts}"
     for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
                          ("tests-apart", "the tests contradict each other"),
@@ -193,8 +193,8 @@ def _other_modes(
         return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' belongs to the stress of the measured test"
     if "unmodelled-curve" in codes:
         return Verdict.NO, "the material alone does not follow the measured curve"
-    others = {name: stable_range for name, stable_range in ranges.items() if name not in measured}
-    if not others:
+    unmeasured = {name: stable_range for name, stable_range in ranges.items() if name not in measured}
+    if not unmeasured:
         if not ranges:
             return Verdict.CARE, "not looked at for this material"
         return own_tests[0], "uniaxial, equibiaxial and planar stress were measured, so that the line above holds"
@@ -204,7 +204,7 @@ def _other_modes(
                 _relative_half_width(predict_band(solution, stretch, noise=False, mode=name))
                 for stretch in _compression_and_tension(stable_range)
             ]
-            for name, stable_range in others.items()
+            for name, stable_range in unmeasured.items()
         }
     except TissuqError as error:
         return Verdict.NO, str(error)

@@ -110,8 +110,8 @@ class BodyFromFile(Case):
             )
         object.__setattr__(self, "hold", dict(self.hold or {}))
         object.__setattr__(self, "digest", sha256(self.content()).hexdigest()[:16])
-        found = self._found()
-        dimensions = found.points.shape[1]
+        mesh_file = self._found()
+        dimensions = mesh_file.points.shape[1]
         shape = self.shape or ("solid" if dimensions == 3 else "")
         if shape not in get_args(Shape) or (shape == "solid") != (dimensions == 3):
             wanted = "solid" if dimensions == 3 else "axisymmetric or plane"
@@ -122,7 +122,7 @@ class BodyFromFile(Case):
         if self.axis not in (("y",) if shape == "axisymmetric" else tuple(AXES[:dimensions])):
             wanted = "y, its axis" if shape == "axisymmetric" else ", ".join(AXES[:dimensions])
             raise InputError(f"a body of the shape {shape} moves along {wanted}, not '{self.axis}'.")
-        if shape == "axisymmetric" and found.points[:, 0].min() < -NEARLY * float(np.ptp(found.points)):
+        if shape == "axisymmetric" and mesh_file.points[:, 0].min() < -NEARLY * float(np.ptp(mesh_file.points)):
             raise InputError(f"the mesh '{self.file}' has points at negative x, the distance from the axis.")
         self._check_cells()
         self._check_sets()
@@ -160,21 +160,21 @@ class BodyFromFile(Case):
 
     def supports(self, points: FloatArray) -> Supports:
         fixed, sets = self._held(points), self._mesh_and_sets()[1]
-        chosen = np.zeros(len(points), dtype=bool)
-        chosen[sets[self.move or self.press]] = True
+        is_loaded = np.zeros(len(points), dtype=bool)
+        is_loaded[sets[self.move or self.press]] = True
         direction = float(np.sign(self.distance))
         if self.move:
-            fixed[chosen, AXIAL] = False
-            return Supports(fixed, chosen, direction, self.parts)
-        outermost = float((direction * points[chosen, AXIAL]).min() * direction)
-        tip = RigidTip(chosen, outermost, self.tip_radius or inf)
+            fixed[is_loaded, AXIAL] = False
+            return Supports(fixed, is_loaded, direction, self.parts)
+        outermost = float((direction * points[is_loaded, AXIAL]).min() * direction)
+        tip = RigidTip(is_loaded, outermost, self.tip_radius or inf)
         return Supports(fixed, np.zeros(len(points), dtype=bool), direction, self.parts, tip)
 
     @property
     def _columns(self) -> tuple[int, ...]:
         """The coordinates of the file that are along the axis, across it, and up, where the body is thinner."""
         axis, sizes = AXES.index(self.axis), np.ptp(self._found().points, axis=0)
-        return axis, *sorted(set(range(len(sizes))) - {axis}, key=lambda other: -sizes[other])
+        return axis, *sorted(set(range(len(sizes))) - {axis}, key=lambda across: -sizes[across])
 
     def _found(self) -> MeshFile:
         return _read_once(self.file, self.digest)
@@ -202,8 +202,8 @@ class BodyFromFile(Case):
         axes = AXES[: mesh.points.shape[1]]
         for name in (*(self.hold or {}), *self._named):
             if name not in sets or not len(sets[name]):
-                near = get_close_matches(name.casefold(), [known.casefold() for known in sets])
-                meant = [known for known in sets if known.casefold() in near]
+                near = get_close_matches(name.casefold(), [set_name.casefold() for set_name in sets])
+                meant = [set_name for set_name in sets if set_name.casefold() in near]
                 hint = f" Did you mean {' or '.join(map(repr, meant))}?" if meant else ""
                 raise InputError(
                     f"the mesh '{self.file}' has no set of points '{name}'; its sets are {', '.join(sets)}.{hint}"
@@ -260,14 +260,14 @@ def _read_once(file: str, digest: str) -> MeshFile:
 @lru_cache(maxsize=MESHES)
 def _mesh_once(file: str, digest: str, columns: tuple[int, ...], shape: str) -> Mesh:
     """Return the mesh of a file with these coordinates of it, and with cells that are no mirror images."""
-    found = _read_once(file, digest)
-    points = found.points[:, columns]
+    mesh_file = _read_once(file, digest)
+    points = mesh_file.points[:, columns]
     xyz = tuple(columns.index(axis) for axis in range(len(columns)))
-    mesh = Mesh(points, found.cells, shape == "plane", shape == "axisymmetric", xyz)
+    mesh = Mesh(points, mesh_file.cells, shape == "plane", shape == "axisymmetric", xyz)
     ends, order = map(list, ORIENTATIONS[mesh.kind.meshio])
-    corners = points[found.cells]
+    corners = points[mesh_file.cells]
     turned = np.linalg.det(corners[:, ends] - corners[:, :1]) < 0
-    cells = np.where(turned[:, None], found.cells[:, order], found.cells)
+    cells = np.where(turned[:, None], mesh_file.cells[:, order], mesh_file.cells)
     for shared in (points, cells):
         shared.setflags(write=False)
     return mesh._replace(cells=cells)
@@ -281,9 +281,9 @@ def _rigid_motions(points: FloatArray, shape: str) -> FloatArray:
         return np.asarray(np.broadcast_to(np.eye(2)[AXIAL], (1, count, 2)))
     shifts = [np.broadcast_to(axis, points.shape) for axis in np.eye(dimensions)]
     turns = []
-    for first in range(dimensions):
-        for second in range(first):
+    for from_axis in range(dimensions):
+        for to_axis in range(from_axis):
             turn = np.zeros_like(points)
-            turn[:, first], turn[:, second] = -centred[:, second], centred[:, first]
+            turn[:, from_axis], turn[:, to_axis] = -centred[:, to_axis], centred[:, from_axis]
             turns.append(turn)
     return np.stack([*shifts, *turns])

@@ -59,14 +59,14 @@ def is_arithmetic(energy: IsochoricEnergy) -> bool:
     logs = (SAMPLE - SAMPLE.mean(axis=1, keepdims=True)).T
     try:
         with np.errstate(all="ignore"):
-            found = _slopes(energy, logs)
+            slopes = _slopes(energy, logs)
             ends = [[energy(tuple(np.exp(logs + sign * NUDGE * axis[:, None]))) for sign in (1, -1)] for axis in AXES]
     except (TypeError, ValueError):
         return False
     if not all(isinstance(value, np.ndarray) for pair in ends for value in pair):
         return False
     wanted = np.array([(high - low) / (2 * NUDGE) for high, low in ends])
-    return bool((np.abs(found - wanted) <= AGREEMENT * np.abs(wanted).max()).all())
+    return bool((np.abs(slopes - wanted) <= AGREEMENT * np.abs(wanted).max()).all())
 
 
 def _isochoric_logs(stretches: FloatArray) -> FloatArray:

@@ -74,7 +74,7 @@ class FibreEnergy:
                 f"has {F.shape[2:]}."
             ) from error
         materials, values = zip(*self.fibres, strict=True)
-        points = (each.reshape(*each.shape[:2], -1) for each in (F, directions))
+        points = (tensors.reshape(*tensors.shape[:2], -1) for tensors in (F, directions))
         return np.asarray(_compiled(materials)[order](*points, values))
 
 
@@ -93,4 +93,4 @@ def _compiled(materials: tuple[FibreMaterial, ...]) -> tuple[Any, Any, Any]:
 
     slopes = jax.grad(energy)
     functions = energy, slopes, jax.jacfwd(slopes)
-    return tuple(jax.jit(jax.vmap(each, (-1, -1, None), -1)) for each in functions)
+    return tuple(jax.jit(jax.vmap(function, (-1, -1, None), -1)) for function in functions)

@@ -139,15 +139,15 @@ def draws_in_full(first_order: FirstOrder, count: int) -> list[int]:
     draws that stiffen, or of draws that soften. The reference, for which nothing is lacking, comes last.
     """
     uneven, softens = first_order.unevenness[:, -1], first_order.stiffening[:, -1] < 1
-    logs, apart = np.log(np.maximum(uneven, EXACT)), np.full(len(uneven), FAR)
-    chosen: list[int] = []
+    logs, distances = np.log(np.maximum(uneven, EXACT)), np.full(len(uneven), FAR)
+    numbers: list[int] = []
     for _ in range(min(count, len(uneven))):
-        unknown = uneven * apart
-        unknown[chosen] = -1.0
+        unknown = uneven * distances
+        unknown[numbers] = -1.0
         number = int(np.argmax(unknown))
-        chosen.append(number)
-        apart = np.where(softens == softens[number], np.minimum(apart, np.abs(logs - logs[number])), apart)
-    return sorted(chosen)
+        numbers.append(number)
+        distances = np.where(softens == softens[number], np.minimum(distances, np.abs(logs - logs[number])), distances)
+    return sorted(numbers)
 
 
 def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> tuple[FloatArray, FirstOrderError]:
@@ -182,30 +182,32 @@ def _at_step(
 ) -> tuple[FloatArray, tuple[float, float, float]]:
     """Return the forces (N,) at a step, and the errors of one that is not in full, of their mean and of their sd."""
 
-    def factors(known: NDArray[np.intp]) -> FloatArray:
-        lack = full[known] / plain[known] - 1
-        return _factors(uneven, softens, uneven[known], lack, softens[known])
+    def factors(usable: NDArray[np.intp]) -> FloatArray:
+        lack = full[usable] / plain[usable] - 1
+        return _factors(uneven, softens, uneven[usable], lack, softens[usable])
 
     def corrected(factors: FloatArray) -> FloatArray:
         return np.asarray(plain * np.maximum(1 + factors * uneven, LEAST_RATIO))
 
-    known = numbers[np.isfinite(full[numbers]) & (uneven[numbers] > EXACT)]
-    factor = factors(known)
+    usable = numbers[np.isfinite(full[numbers]) & (uneven[numbers] > EXACT)]
+    factor = factors(usable)
     forces = corrected(factor)
     per_factor = plain * uneven / forces
     forces[numbers] = full[numbers]
-    if not len(known):
+    if not len(usable):
         return forces, (0.0, 0.0, 0.0)
     is_there, is_followed = np.isfinite(forces), ~np.isin(np.arange(len(plain)), numbers)
     mean, sd = forces[is_there].mean(), forces[is_there].std()
-    telling, changes = known[uneven[known] >= LEAST_RATIO * uneven[known].max()], []
+    telling, changes = usable[uneven[usable] >= LEAST_RATIO * uneven[usable].max()], []
     for number in telling:
-        without = factors(known[known != number])
+        without = factors(usable[usable != number])
         then = corrected(without)[is_there]
         changes.append((abs(without[number] - factor[number]), then.mean() / mean - 1, then.std() / sd - 1))
     of_factor, *of_band = np.transpose(changes)
-    apart = _factors(uneven, softens, uneven[telling], of_factor * uneven[telling], softens[telling]) * per_factor
-    of_force = np.sqrt((apart[is_followed if is_followed.any() else telling] ** 2).mean())
+    force_errors = (
+        _factors(uneven, softens, uneven[telling], of_factor * uneven[telling], softens[telling]) * per_factor
+    )
+    of_force = np.sqrt((force_errors[is_followed if is_followed.any() else telling] ** 2).mean())
     of_mean, of_sd = 0.5 * np.sqrt(np.square(of_band).sum(axis=1))
     independent = of_force * np.sqrt(is_followed.sum()) / len(plain)
     return forces, (
@@ -225,6 +227,6 @@ def _factors(
         order = np.argsort(near[used])
         if len(order):
             logs = np.log(near[used][order])
-            own = np.interp(np.log(np.maximum(uneven, EXACT)), logs, (lack[used] / near[used])[order])
-            factors = np.where(softens == is_soft, own, factors)
+            interpolated = np.interp(np.log(np.maximum(uneven, EXACT)), logs, (lack[used] / near[used])[order])
+            factors = np.where(softens == is_soft, interpolated, factors)
     return factors

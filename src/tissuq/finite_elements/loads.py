@@ -81,14 +81,14 @@ class Contact(Load):
         count, dimensions = u.shape
         axis = np.zeros(dimensions)
         axis[AXIAL] = self.direction
-        apart = self.points + u
-        apart[:, AXIAL] -= self.tip.start + self.direction * travel
+        offset = self.points + u
+        offset[:, AXIAL] -= self.tip.start + self.direction * travel
         if np.isinf(self.tip.radius):
-            depth, normal, curvature = -apart @ axis, np.broadcast_to(axis, u.shape), np.zeros(count)
+            depth, normal, curvature = -offset @ axis, np.broadcast_to(axis, u.shape), np.zeros(count)
         else:
-            apart = apart + self.tip.radius * axis
-            distance = np.linalg.norm(apart, axis=1)
-            depth, normal, curvature = self.tip.radius - distance, apart / distance[:, None], 1 / distance
+            offset = offset + self.tip.radius * axis
+            distance = np.linalg.norm(offset, axis=1)
+            depth, normal, curvature = self.tip.radius - distance, offset / distance[:, None], 1 / distance
         pressed = np.where(depth > 0, self.stiffness, 0.0)
         push = pressed * depth
         squares = normal[:, :, None] * normal[:, None, :]

@@ -311,12 +311,12 @@ Part = tuple[Material, tuple[float, ...]]
 def _matrix_and_fibres(material: Material, values: ArrayLike | None) -> tuple[DistortionalEnergy, Fibres]:
     """Return the energy of what is isotropic in a material, and its fibres."""
     if isinstance(material, EnergyDraw):
-        wholes, beside = material.parts, (material.discrepancy, material.continuation)
+        laws, beside = material.parts, (material.discrepancy, material.continuation)
     else:
-        wholes, beside = ((material, _complete(material, values)),), (None, None)
-    parts = [part for whole in wholes for part in _parts(*whole)]
-    fibres = tuple((kind, numbers) for kind, numbers in parts if isinstance(kind, FibreMaterial))
-    matrix = [part for part in parts if not isinstance(part[0], FibreMaterial)]
+        laws, beside = ((material, _complete(material, values)),), (None, None)
+    terms = [term for law in laws for term in _parts(*law)]
+    fibres = tuple((kind, numbers) for kind, numbers in terms if isinstance(kind, FibreMaterial))
+    matrix = [term for term in terms if not isinstance(term[0], FibreMaterial)]
     if not matrix or not all(kind.is_isotropic for kind, _ in matrix):
         raise ModelError(
             f"material '{material.name}' is no sum of an isotropic matrix and fibres, which finite elements need, such "

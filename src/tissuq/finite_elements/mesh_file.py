@@ -53,12 +53,12 @@ def read_mesh(path: Path) -> MeshFile:
     try:
         with redirect_stdout(said), redirect_stderr(said):
             is_deck = path.suffix.lower() == ".inp"
-            found = meshio.read(StringIO(deck_text(path)), "abaqus") if is_deck else meshio.read(path)
+            mesh = meshio.read(StringIO(deck_text(path)), "abaqus") if is_deck else meshio.read(path)
     except OSError as error:
         raise InputError(f"the mesh '{path}' cannot be read: {error.strerror or error}.") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever a damaged file leads to, or exit
         raise InputError(f"'{path}' cannot be read as a mesh: {_why_unreadable(path, error)}") from error
-    return _used(path, found)
+    return _used(path, mesh)
 
 
 def _why_unreadable(path: Path, error: BaseException) -> str:
@@ -85,20 +85,20 @@ def deck_text(path: Path, depth: int = 0) -> str:
     return PLANE_ELEMENT.sub(lambda match: match[1] + AS_MESHIO_KNOWS_IT[match[2]], text)
 
 
-def _used(path: Path, found: Any) -> MeshFile:
+def _used(path: Path, mesh: Any) -> MeshFile:
     """Return the cells with most dimensions, the points that they use, and the sets among these."""
     names = {kind.meshio: dimensions for (dimensions, _), kind in CELL_KINDS.items()}
-    highest = max((block.dim for block in found.cells if len(block)), default=0)
-    blocks = [block for block in found.cells if block.dim == highest and len(block)]
+    highest = max((block.dim for block in mesh.cells if len(block)), default=0)
+    blocks = [block for block in mesh.cells if block.dim == highest and len(block)]
     kinds = sorted({block.type for block in blocks})
-    known = ", ".join(names)
+    usable_kinds = ", ".join(names)
     if highest < 2:
         has = f"only {', '.join(kinds)}" if kinds else "no cells"
-        raise InputError(f"'{path}' has {has}: mesh the body, and save its cells ({known}).")
+        raise InputError(f"'{path}' has {has}: mesh the body, and save its cells ({usable_kinds}).")
     used = np.unique(np.concatenate([block.data.ravel() for block in blocks])).astype(np.intp)
-    if used[0] < 0 or used[-1] >= len(found.points):
+    if used[0] < 0 or used[-1] >= len(mesh.points):
         raise InputError(f"'{path}' has cells with points that it does not hold; write the mesh again.")
-    if highest == 2 and _is_in_space(np.asarray(found.points, dtype=np.float64)[used]):
+    if highest == 2 and _is_in_space(np.asarray(mesh.points, dtype=np.float64)[used]):
         raise InputError(
             f"'{path}' has only the cells of a surface in space ({', '.join(kinds)}): mesh the volume, too, and save "
             "its cells (gmsh -3 -order 2); a plane or axisymmetric body lies in the x-y plane."
@@ -107,18 +107,18 @@ def _used(path: Path, found: Any) -> MeshFile:
         linear = " Make triangles and tetrahedra of second order (gmsh -order 2)." * bool(
             {"triangle", "tetra"} & {*kinds}
         )
-        raise InputError(f"'{path}' has cells {', '.join(kinds)}; use one of {known}.{linear}")
+        raise InputError(f"'{path}' has cells {', '.join(kinds)}; use one of {usable_kinds}.{linear}")
     cells = np.concatenate([block.data for block in blocks]).astype(np.intp)
     cells = np.searchsorted(used, cells)
     dimensions = names[kinds[0]]
-    points = np.asarray(found.points, dtype=np.float64)[used]
+    points = np.asarray(mesh.points, dtype=np.float64)[used]
     if not np.isfinite(points).all():
         raise InputError(f"'{path}' has points whose coordinates are no numbers; write the mesh again.")
     size = float(np.ptp(points, axis=0).max())
     points = points[:, :dimensions]
-    numbers = np.full(len(found.points), -1)
+    numbers = np.full(len(mesh.points), -1)
     numbers[used] = np.arange(len(used))
-    sets = {name: numbers[members] for name, members in _sets(found)}
+    sets = {name: numbers[members] for name, members in _sets(mesh)}
     ends = {
         f"{AXES[axis]}{end}": np.flatnonzero(np.abs(points[:, axis] - value) < NEARLY * size)
         for axis in range(dimensions)
@@ -133,16 +133,16 @@ def _is_in_space(points: FloatArray) -> bool:
     return bool(len(sizes) > 2 and sizes[2] > NEARLY * sizes.max())
 
 
-def _sets(found: Any) -> Iterator[tuple[str, NDArray[np.intp]]]:
+def _sets(mesh: Any) -> Iterator[tuple[str, NDArray[np.intp]]]:
     """Yield the sets of points of a file, and the points of its named groups of cells."""
-    for name, members in found.point_sets.items():
+    for name, members in mesh.point_sets.items():
         yield name, np.asarray(members, dtype=np.intp)
-    numbers = found.cell_data.get("gmsh:physical", ())
-    groups = {name: rows for name, rows in found.cell_sets.items() if not name.startswith("gmsh:")}
-    for name, (number, dimensions) in found.field_data.items():
-        blocks = zip(found.cells, numbers, strict=False)
+    numbers = mesh.cell_data.get("gmsh:physical", ())
+    groups = {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    for name, (number, dimensions) in mesh.field_data.items():
+        blocks = zip(mesh.cells, numbers, strict=False)
         groups[name] = [np.flatnonzero((of_block == number) & (block.dim == dimensions)) for block, of_block in blocks]
     for name, rows in groups.items():
-        blocks = zip(found.cells, rows, strict=False)
-        parts = [block.data[np.asarray(row, dtype=np.intp)].ravel() for block, row in blocks if row is not None]
-        yield name, np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *parts]))
+        blocks = zip(mesh.cells, rows, strict=False)
+        of_blocks = [block.data[np.asarray(row, dtype=np.intp)].ravel() for block, row in blocks if row is not None]
+        yield name, np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *of_blocks]))

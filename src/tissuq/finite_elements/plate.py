@@ -64,8 +64,8 @@ class PlateWithHole(Case):
         heights = np.linspace(0, self.thickness / 2, ceil(LAYERS * self.fineness) + 1)
         points = np.concatenate(np.broadcast_arrays(plane[..., None, 0:1], plane[..., None, 1:2], heights[:, None]), -1)
         number = np.arange(points.size // 3).reshape(points.shape[:-1])
-        below = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
-        corners = [face[..., layer].ravel() for layer in (slice(-1), slice(1, None)) for face in below]
+        faces = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+        corners = [face[..., layer].ravel() for layer in (slice(-1), slice(1, None)) for face in faces]
         return Mesh(points.reshape(-1, 3), np.stack(corners, axis=-1))
 
     def supports(self, points: FloatArray) -> Supports:

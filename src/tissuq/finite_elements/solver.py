@@ -193,9 +193,11 @@ class Solver:
         self._field[0].values[:] = rates.reshape(u.shape)
         F_rate = self._field.extract()[0] - np.eye(3)[:, :, None, None]
         self._field[0].values[:] = u
-        matrices, matrix_rates = (np.moveaxis(each, (0, 1), (-2, -1)).reshape(-1, 3, 3) for each in (F, F_rate))
-        left, stretches, right = np.linalg.svd(matrices)
-        log_rates = np.einsum("nia,nij,naj->na", left, matrix_rates, right) / stretches
+        matrices, matrix_rates = (
+            np.moveaxis(gradients, (0, 1), (-2, -1)).reshape(-1, 3, 3) for gradients in (F, F_rate)
+        )
+        left_vectors, stretches, right_vectors = np.linalg.svd(matrices)
+        log_rates = np.einsum("nia,nij,naj->na", left_vectors, matrix_rates, right_vectors) / stretches
         share = np.abs(self._rate).max() if action is None else 1.0
         cells = self._volumes.sum(axis=0)
         J_rate = J * log_rates.sum(axis=1).reshape(J.shape)

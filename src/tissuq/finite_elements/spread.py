@@ -170,14 +170,14 @@ def _explained(
                 designs[name] = np.column_stack([columns, growth - growth.mean()])
     joint = np.hstack(list(designs.values()))
     fitted = {
-        name: np.linalg.lstsq(joint, part - part.mean(), rcond=None)[0]
-        for name, part in (("", values), ("parameters", parameters), ("discrepancy", discrepancy))
+        name: np.linalg.lstsq(joint, target - target.mean(), rcond=None)[0]
+        for name, target in (("", values), ("parameters", parameters), ("discrepancy", discrepancy))
     }
     ends = np.cumsum([0, *(columns.shape[1] for columns in designs.values())])
     spans = zip(designs, ends, ends[1:], strict=False)
     explained = {name: joint[:, start:end] @ fitted[""][start:end] for name, start, end in spans}
-    left = {"parameters": parameters - joint @ fitted["parameters"]}
-    return explained | left | {"discrepancy": discrepancy - joint @ fitted["discrepancy"]}
+    unexplained = {"parameters": parameters - joint @ fitted["parameters"]}
+    return explained | unexplained | {"discrepancy": discrepancy - joint @ fitted["discrepancy"]}
 
 
 def _shares(complete: FloatArray, parts: Mapping[str, FloatArray], noise_sd: float) -> Shares:
@@ -190,8 +190,8 @@ def _shares(complete: FloatArray, parts: Mapping[str, FloatArray], noise_sd: flo
             name: (centred * parts[name]).sum(axis=0) / (len(complete) - 1) / total if name in parts else unknown
             for name in SOURCES
         }
-        first, second = (values - values.mean(axis=0) for values in (parts["Q0"], parts["rest"]))
-        correlation = (first * second).sum(axis=0) / np.sqrt((first**2).sum(axis=0) * (second**2).sum(axis=0))
+        base, remainder = (values - values.mean(axis=0) for values in (parts["Q0"], parts["rest"]))
+        correlation = (base * remainder).sum(axis=0) / np.sqrt((base**2).sum(axis=0) * (remainder**2).sum(axis=0))
         return Shares(noise=noise_sd**2 / total, correlation=correlation, **due_to)
 
 
@@ -271,12 +271,12 @@ def force_table(
     return pd.DataFrame(rows)
 
 
-def mesh_factor(at: FloatArray, changes: Sequence[tuple[float, float]], finer: float) -> FloatArray:
+def mesh_factor(abscissa: FloatArray, changes: Sequence[tuple[float, float]], finer: float) -> FloatArray:
     """Return what a quantity is to be multiplied by at travels or times (s,) for cells without size (Richardson).
 
     Parameters
     ----------
-    at : (s,) array
+    abscissa : (s,) array
     changes : sequence of (float, float)
         Travels or times, rising, and the relative changes of the quantity on a finer mesh there.
     finer : float
@@ -288,8 +288,8 @@ def mesh_factor(at: FloatArray, changes: Sequence[tuple[float, float]], finer: f
     [0.98, 0.96]
     """
     if not changes:
-        return np.ones(len(at))
-    return np.asarray(1 + finer / (finer - 1) * np.interp(at, *np.transpose(changes)))
+        return np.ones(len(abscissa))
+    return np.asarray(1 + finer / (finer - 1) * np.interp(abscissa, *np.transpose(changes)))
 
 
 def mesh_free(table: pd.DataFrame, factor: FloatArray) -> pd.DataFrame:
@@ -309,8 +309,8 @@ def mesh_free(table: pd.DataFrame, factor: FloatArray) -> pd.DataFrame:
     middle = table["mean"] * factor
     table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * factor, spread)
     for end in ("low", "high"):
-        apart = np.hypot((table[end] - table["mean"]) * factor, 2 * spread)
-        table[f"mesh_free_{end}"] = middle + (apart if end == "high" else -apart)
+        distance = np.hypot((table[end] - table["mean"]) * factor, 2 * spread)
+        table[f"mesh_free_{end}"] = middle + (distance if end == "high" else -distance)
     on_mesh = table["sd"] ** 2 / (1 - table["noise"])
     noise = on_mesh * table["noise"]
     total = table["mesh_free_sd"] ** 2 + noise
@@ -335,8 +335,8 @@ def _with_errors(
 
     def statistics(complete: FloatArray, *values: FloatArray) -> dict[str, FloatArray]:
         band, shares = band_of(complete), _shares(complete, dict(zip(parts, values, strict=True)), noise_sd)
-        both = {name: getattr(band, name) for name in BAND} | {name: getattr(shares, name) for name in SHARES}
-        return {name: values for name, values in both.items() if name in ALWAYS or name in parts}
+        columns = {name: getattr(band, name) for name in BAND} | {name: getattr(shares, name) for name in SHARES}
+        return {name: values for name, values in columns.items() if name in ALWAYS or name in parts}
 
     estimates, errors = statistics(draws, *parts.values()), standard_errors(statistics, draws, *parts.values())
     return {name: float(estimates[name][0]) for name in estimates} | {

@@ -61,9 +61,9 @@ def _extrapolated(simulation: Simulation) -> list[str]:
     if energy < MIN_ENERGY_SHARE:
         return []
     max_1, max_2 = simulation.max_invariants
-    at = simulation.case.shown(simulation.travel[last])
+    travel = simulation.case.shown(simulation.travel[last])
     return [
-        f"At {at}, {100 * volume:.2g} % of the volume, with {100 * energy:.0f} % of the "
+        f"At {travel}, {100 * volume:.2g} % of the volume, with {100 * energy:.0f} % of the "
         f"strain energy, is strained beyond what was measured (I1 - 3 up to {max_1:.3g}, I2 - 3 up to {max_2:.3g}). "
         "There the energy of every draw goes on as it ends, with an error that grows with the strain."
     ]
@@ -102,11 +102,11 @@ def _few_in_full(simulation: Simulation) -> list[str]:
     in_full = int(simulation.in_full.sum())
     if in_full >= MIN_IN_FULL and max(errors.sd[last], errors.mean[last] * abs(mean) / sd) <= MAX_FIRST_ORDER_ERROR:
         return []
-    at, more = simulation.case.shown(simulation.travel[last]), max(MIN_IN_FULL, 2 * in_full)
-    beyond = ", or by more than that, which so few do not tell" if in_full < MIN_IN_FULL else ""
+    travel, more = simulation.case.shown(simulation.travel[last]), max(MIN_IN_FULL, 2 * in_full)
+    caveat = ", or by more than that, which so few do not tell" if in_full < MIN_IN_FULL else ""
     return [
-        f"With {in_full} of {len(forces)} draws computed in full, the sd of the {simulation.case.response} at {at} may "
-        f"be off by {100 * errors.sd[last]:.2g} % and its mean by {100 * errors.mean[last]:.2g} %{beyond}: compute "
+        f"With {in_full} of {len(forces)} draws computed in full, the sd of the {simulation.case.response} at {travel} "
+        f"may be off by {100 * errors.sd[last]:.2g} % and its mean by {100 * errors.mean[last]:.2g} %{caveat}: compute "
         f"more in full (--full-runs {more})."
     ]
 

@@ -34,9 +34,9 @@ NO_STRESS = 0.02
 
 
 class Way(NamedTuple):
-    """Places of points in the order of what they are drawn against, and whether as a curve or by themselves."""
+    """Indices of points in the order of what they are drawn against, and whether as a curve or by themselves."""
 
-    places: NDArray[np.intp]
+    indices: NDArray[np.intp]
     is_curve: bool
 
 
@@ -120,12 +120,12 @@ def described(
     """Return what a posterior says of every measured curve, of which it may be known what is inside its band."""
     curves = solution.model.experiment.curves
     pairs = zip(curves, inside or [None] * len(curves), strict=True)
-    return [Described(solution, curve, prob, known) for curve, known in pairs]
+    return [Described(solution, curve, prob, is_inside) for curve, is_inside in pairs]
 
 
-def is_determined(alone: Band, stress: Band) -> bool:
+def is_determined(material: Band, stress: Band) -> bool:
     """Return whether the stress of the material alone is known at all: to no less than all stress beside it."""
-    return root_mean_square(alone.high - alone.low) / 2 <= root_mean_square(stress.median)
+    return root_mean_square(material.high - material.low) / 2 <= root_mean_square(stress.median)
 
 
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:

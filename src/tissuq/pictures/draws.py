@@ -23,14 +23,14 @@ def curves(drawn: Panels, stretch: FloatArray, stress: FloatArray, mode: Loading
     """Draw the stresses (N, g), MPa, of draws at stretches (g,), and their median."""
     (axis,), count = drawn.axes, len(stress)
     order = np.argsort(stretch, kind="stable")
-    at, values = stretch[order], stress[:, order] / unit.to_mpa
+    abscissa, values = stretch[order], stress[:, order] / unit.to_mpa
     median = np.median(values, axis=0)
     limits = limits_of([median], [np.quantile(values, [0.005, 0.995], axis=0)])
-    places = np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)
-    label = f"{count} draws" if len(places) == count else f"{len(places)} of {count} draws"
-    for number, row in enumerate(values[places]):
-        line(axis, at, within(row, limits), color=BASE, width=0.6, alpha=0.5, label="" if number else label)
-    line(axis, at, median, color=BAND, label="median of the draws")
+    indices = np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)
+    label = f"{count} draws" if len(indices) == count else f"{len(indices)} of {count} draws"
+    for number, row in enumerate(values[indices]):
+        line(axis, abscissa, within(row, limits), color=BASE, width=0.6, alpha=0.5, label="" if number else label)
+    line(axis, abscissa, median, color=BAND, label="median of the draws")
     axis.set_ylim(limits)
     axis.set_xlabel(mode.controls[0].name)
     axis.set_ylabel(f"{mode.stresses[0]} [{unit.name}]")

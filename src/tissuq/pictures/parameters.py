@@ -66,8 +66,8 @@ def marginals(solution: Solution, drawn: Panels, names: Sequence[str], unit: Str
         density(axis, values / factor, height * factor, label="posterior")
         top = float(height.max()) * factor
         if prior is not None:
-            at, prior_height = _prior(prior, values)
-            line(axis, at / factor, prior_height * factor, color=BASE, style=":", width=1.4, label="prior")
+            prior_values, prior_height = _prior(prior, values)
+            line(axis, prior_values / factor, prior_height * factor, color=BASE, style=":", width=1.4, label="prior")
         low, high = (end / factor for end in marginal.hdi(prob))
         middle = float(marginal.quantile(0.5)) / factor
         interval = f"median and {100 * prob:.4g} % HPD"

@@ -194,11 +194,11 @@ def draw_predicted(
     scale, percent, abscissa = unit.to_mpa, f"{100 * prob:.4g} %", predicted.abscissa
     ends = limits[0] / scale, limits[1] / scale
     for number, (indices, is_curve) in enumerate(predicted.ways):
-        for of, strength, label in (
+        for interval, strength, label in (
             (predicted.measurements, 0.18, f"{percent} of measurements"),
             (predicted.stress, 0.38, f"{percent} of the stress"),
         ):
-            low, high = within(of.low[indices] / scale, ends), within(of.high[indices] / scale, ends)
+            low, high = within(interval.low[indices] / scale, ends), within(interval.high[indices] / scale, ends)
             label = "" if number else label
             band(axis, abscissa[indices], low, high, strength=strength, label=label, is_path=is_curve)
         median = within(predicted.stress.median[indices] / scale, ends)

@@ -31,10 +31,10 @@ def stability(solution: Solution, drawn: Panels) -> None:
                  label=f"{sure:g} %, from where it counts as stable")  # fmt: skip
     lowest = 100.0
     for number, mode in enumerate(curve_modes()):
-        found = stability_over(solution, mode, None, POINTS)
-        line(axis, found.stretch, 100 * found.stable, color=SERIES[number % len(SERIES)], label=mode.name,
+        curve = stability_over(solution, mode, None, POINTS)
+        line(axis, curve.stretch, 100 * curve.stable, color=SERIES[number % len(SERIES)], label=mode.name,
              style=STYLES[number % len(STYLES)], width=2.4 - 0.4 * (number % len(STYLES)))  # fmt: skip
-        lowest = min(lowest, 100 * float(found.stable.min()))
+        lowest = min(lowest, 100 * float(curve.stable.min()))
     lowest = min(lowest, LEAST_SHOWN)
     axis.set_ylim(lowest - 0.04 * (100 - lowest), 100 + 0.06 * (100 - lowest))
     axis.set_xlabel("stretch")
