@@ -61,7 +61,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     model, runs = study.forward.name, len(calibration.runs)
     has_discrepancy = calibration.problem.discrepancy.is_correlated
     inside_alone = calibration.predictive_coverage(discrepancy=False)
-    alone = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
+    remark = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
     numbers = [
         Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""), interval_is="95 % HPD")
         for symbol, marginal in calibration.marginals.items()
@@ -73,7 +73,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
         title="Parameters of an expensive forward model",
         subject=f"{len(calibration.problem.measured)} measurements · forward model {model} · {runs} runs · discrepancy "
         f"{settings.discrepancy}",
-        numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=alone)),
+        numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=remark)),
         finding=_lead(study),
         next_step=_next_step(study),
         picture=Picture(
@@ -128,7 +128,9 @@ def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict
     """Return the user's files, so that the run can be repeated, and the settings that name the copies."""
     sources = [beside / file for file in study.settings.files]
     folders = _folders(len(sources))
-    copies: dict[str, Any] = {f"{place}/{source.name}": source for place, source in zip(folders, sources, strict=True)}
+    copies: dict[str, Any] = {
+        f"{folder}/{source.name}": source for folder, source in zip(folders, sources, strict=True)
+    }
     relocated: dict[str, Any] = {"files": tuple(copies)}
     if decks := _decks(study):
         of_models, relocated_models = _model_copies(decks, study.settings, beside)
@@ -159,15 +161,15 @@ def _model_copies(
     decks: list[tuple[tuple[str, ...], DeckForward]], settings: CalibrationSettings, beside: Path
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the files of finite-element models and of functions, and the settings that name their copies."""
-    copies, models, places = dict[str, Any](), list[str](), list[str]()
-    for place, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
-        deck, stored = forward.read_deck, f"{place}/{MODEL}"
+    copies, models, also_copies = dict[str, Any](), list[str](), list[str]()
+    for folder, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
+        deck, stored = forward.read_deck, f"{folder}/{MODEL}"
         copies |= {f"{stored}/{name}": deck.root / name for name in deck.files}
         copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
         models.append(f"{stored}/{deck.main}")
         also = [stored_place(deck, Path(file)) for file in forward.also]
-        places += [file if Path(file).is_absolute() else f"{place}/{file}" for file in also]
-    relocated: dict[str, Any] = {"models": tuple(models), "also": list(dict.fromkeys(places))}
+        also_copies += [file if Path(file).is_absolute() else f"{folder}/{file}" for file in also]
+    relocated: dict[str, Any] = {"models": tuple(models), "also": list(dict.fromkeys(also_copies))}
     for setting in ("quantities", "along"):
         texts = dict(getattr(settings, setting))
         for name, text in texts.items():
@@ -245,27 +247,27 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     calibration, runs = study.calibration, study.calibration.runs
     labels, held_out = list(map(study.label, runs.symbols)), calibration.held_out
     has_discrepancy = calibration.problem.discrepancy.is_correlated
-    both = (
+    panel_words = (
         " Left: forward model and discrepancy. Right: the forward model alone; where it misses, the model is wrong."
         if has_discrepancy
         else ""
     )
     band = Picture(
         "band", lambda: band_figure(calibration, study.data), "Predictive bands over the measurements",
-        f"95 % predictive band of a new measurement, including noise.{both}", not has_discrepancy,
+        f"95 % predictive band of a new measurement, including noise.{panel_words}", not has_discrepancy,
     )  # fmt: skip
     marginals = Picture(
         "marginals", lambda: marginals_figure(study), "Marginal posteriors",
         "Blue: marginal posterior and its 95 % HPD. Dashed: without the error of the emulator. Dotted: prior.",
     )  # fmt: skip
-    alone = (
+    inside_alone = (
         f", and {100 * calibration.predictive_coverage(discrepancy=False):.0f} % inside that of the forward model alone"
         if has_discrepancy
         else ""
     )
     coverage = (
-        f"{100 * calibration.predictive_coverage():.0f} % of the measurements lie inside the band{alone}. A good "
-        "predictive check does not mean that the parameters are right."
+        f"{100 * calibration.predictive_coverage():.0f} % of the measurements lie inside the band{inside_alone}. A "
+        "good predictive check does not mean that the parameters are right."
     )
     placed = ", and runs placed in the posterior, before they were added to the emulator (orange)" if held_out else ""
     errors = Picture(
@@ -279,8 +281,8 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
         "worst direction of the data, mean over the posterior).",
     )
     sensitivity = [
-        [str(symbol), f"{100 * first:.0f} %", f"{100 * total:.0f} %"]
-        for symbol, first, total in calibration.sensitivity.itertuples()
+        [str(symbol), f"{100 * first_order:.0f} %", f"{100 * total:.0f} %"]
+        for symbol, first_order, total in calibration.sensitivity.itertuples()
     ]
     sections = [
         Section("Posteriors and predictive checks", (band, coverage, marginals)),
@@ -342,8 +344,9 @@ def _model_run(forward: DeckForward, names: tuple[str, ...], study: CalibrationS
     settings, solver = study.settings, forward.program
     named = [name or next(iter(settings.quantities)) for name in names]
     of_file = (
-        f"{study.data[name].measured_label} of the file is {factor:.6g} times {of} ({settings.quantities[of]})"
-        for name, of, factor in zip(names, named, forward.factors.values(), strict=True)
+        f"{study.data[name].measured_label} of the file is {factor:.6g} times {quantity} "
+        f"({settings.quantities[quantity]})"
+        for name, quantity, factor in zip(names, named, forward.factors.values(), strict=True)
     )
     control = study.data[names[0]].control_label
     controlled = forward.along or "the time of the model"

@@ -40,10 +40,10 @@ def band_figure(calibration: Calibration, data: Mapping[str, Measured], *, is_na
     with new_figure(width, height) as figure:
         panels = figure.subplots(len(data), len(titles), squeeze=False, sharey="row")
         for row, (name, measured) in zip(panels, data.items(), strict=True):
-            part = slice(*calibration.problem.quantities[name])
+            rows = slice(*calibration.problem.quantities[name])
             order = np.argsort(measured.control, kind="stable")
             for axis, (kind, title) in zip(row, titles.items(), strict=True):
-                band = bands[kind].iloc[part].iloc[order]
+                band = bands[kind].iloc[rows].iloc[order]
                 pieces.band(axis, band["control"], band["low"], band["high"], label="95 % predictive band")
                 pieces.line(axis, band["control"], band["mean"], label="predicted mean")
                 pieces.points(axis, measured.control, measured.measured)

@@ -122,8 +122,8 @@ def _measured(described: Sequence[Described]) -> Iterator[_Test]:
             rows = _spread(np.argsort(curve.abscissa, kind="stable") if described_curve.points.ndim == 1 else indices)
             named = f"{name}, path {number}" if len(described_curve.ways) > 1 else name
             points = described_curve.points[_drawn(indices, is_curve)]
-            at, stress, is_back = curve.abscissa[rows], curve.stress[rows], curve.is_back[rows]
-            yield _Test(named, curve.mode, curve.channel, points, at, stress, is_curve, is_back)
+            abscissa, stress, is_back = curve.abscissa[rows], curve.stress[rows], curve.is_back[rows]
+            yield _Test(named, curve.mode, curve.channel, points, abscissa, stress, is_curve, is_back)
 
 
 def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:

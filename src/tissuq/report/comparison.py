@@ -80,10 +80,11 @@ def comparison_warnings(table: pd.DataFrame) -> list[str]:
             "Numbers marked rough are not reliable: a few influential measurements dominate the importance weights."
         )
     names = {
-        str(of): list(rows.index) for of, rows in table[table["intervals_of"] != ""].groupby("intervals_of", sort=False)
+        str(quantity): list(rows.index)
+        for quantity, rows in table[table["intervals_of"] != ""].groupby("intervals_of", sort=False)
     }
     if len(names) > 1:
-        said = "; ".join(f"of {', '.join(map(str, fits))} they are of {of}" for of, fits in names.items())
+        said = "; ".join(f"of {', '.join(map(str, fits))} they are of {quantity}" for quantity, fits in names.items())
         warnings.append(f"The intervals are of different things, so that their widths cannot be compared: {said}.")
     return warnings
 
@@ -179,13 +180,13 @@ def _numbers(table: pd.DataFrame, unit: StressUnit) -> tuple[Number, ...]:
         numbers.append(Number("largest evidence", name, remark=f"probability {table['probability'][name]:.0%}"))
     best = str(table["elpd"].idxmax())
     numbers.append(Number("best for left-out measurements", best, remark=f"stacking {table['stacking'][best]:.2f}"))
-    known = table.dropna(subset=["median"])
-    if len(known) and known["parameter"].nunique() == 1:
-        low, high = (float(end) / unit.to_mpa for end in (known["median"].min(), known["median"].max()))
-        overlap = known["hdi_low"].max() <= known["hdi_high"].min()
+    summarised = table.dropna(subset=["median"])
+    if len(summarised) and summarised["parameter"].nunique() == 1:
+        low, high = (float(end) / unit.to_mpa for end in (summarised["median"].min(), summarised["median"].max()))
+        overlap = summarised["hdi_low"].max() <= summarised["hdi_high"].min()
         words = "all 95 % intervals overlap" if overlap else "the 95 % intervals contradict each other"
         value = f"{significant(low)} to {significant(high)} {unit.name}"
-        numbers.append(Number(f"median of {known['parameter'].iloc[0]}, over the fits", value, remark=words))
+        numbers.append(Number(f"median of {summarised['parameter'].iloc[0]}, over the fits", value, remark=words))
     return tuple(numbers)
 
 

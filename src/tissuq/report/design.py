@@ -52,8 +52,8 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     tolerances, tests = model.tolerances, model.experiment.tests
     estimand = TISSUE if is_other and tolerances.estimand == SPECIMEN else tolerances.estimand
     errors = f" --estimand {estimand}" * (estimand == (TISSUE if is_other else AS_TESTED))
-    told = {*model.experiment.least_errors, *(("stress", "test") if len(tests) > 1 else ())}
-    stated = {name: size for name, size in tolerances.unusual.items() if name not in told}
+    measured_errors = {*model.experiment.least_errors, *(("stress", "test") if len(tests) > 1 else ())}
+    stated = {name: size for name, size in tolerances.unusual.items() if name not in measured_errors}
     errors += "".join(f" --tolerance {name}={size:g}" for name, size in stated.items())
     best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
@@ -91,8 +91,8 @@ def design_figure(study: DesignStudy) -> Figure:
     return _figure(study, study.targets, MAX_ROWS, WIDTH)
 
 
-def _figure(study: DesignStudy, targets: Sequence[Target], most: int, width: float) -> Figure:
-    shown = [_shown(_rows_of(study, target), most) for target in targets]
+def _figure(study: DesignStudy, targets: Sequence[Target], limit: int, width: float) -> Figure:
+    shown = [_shown(_rows_of(study, target), limit) for target in targets]
     height = 1.5 + 0.3 * max(map(len, shown))
     with new_figure(width, 0.4 + height * len(shown)) as figure:
         axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
@@ -119,7 +119,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
     """
     said = said_by(run)
     rows, model = _rows_in_unit(study), study.posterior.model
-    every = Picture("design", lambda: design_figure(study), "Expected standard deviations after each test", CAPTION)
+    figure = Picture("design", lambda: design_figure(study), "Expected standard deviations after each test", CAPTION)
     how_to_read = (
         *study.explanations,
         "The ranking does not know what a laboratory can do: of two tests with nearly the same number choose the one "
@@ -142,7 +142,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
                   _capitalised(heading(study, target)), (0, 3))
             for target in study.targets
         ),
-        sections=(Section("Every test", (tuple(_sentences(study)), every)), Section("How to read it", (how_to_read,))),
+        sections=(Section("Every test", (tuple(_sentences(study)), figure)), Section("How to read it", (how_to_read,))),
         warnings=(*said.warnings, *study.warnings),
         files={"design.csv": rows, "design.json": rows},
         recipe=recipe,
@@ -225,11 +225,11 @@ def _capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _shown(table: pd.DataFrame, most: int) -> pd.DataFrame:
+def _shown(table: pd.DataFrame, limit: int) -> pd.DataFrame:
     """Return the best tests with numbers, and the tests of the data again."""
     ranked = table.dropna(subset=["reduction"])
     ranks = np.arange(len(ranked))
-    return ranked[ranked["is_repeat"].to_numpy() | (ranks < most)]
+    return ranked[ranked["is_repeat"].to_numpy() | (ranks < limit)]
 
 
 def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) -> None:

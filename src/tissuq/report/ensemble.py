@@ -95,7 +95,7 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
     limits = prepared.tasks(folder)[0].limits
     headers, rows = readable_quantities(study)
     count = len(prepared.ensembles)
-    first = next(iter(tables))
+    quantity = next(iter(tables))
     return Result(
         command="ensemble",
         title="From the posterior into your model",
@@ -104,8 +104,8 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
         numbers=_numbers(study, tables),
         finding=_lead(study, tables),
         next_step=_next_step(study, folder, beside),
-        picture=Picture("answer", lambda: band_over_time(tables[first], first), f"Band of {first} over time",
-                        f"{first}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
+        picture=Picture("answer", lambda: band_over_time(tables[quantity], quantity), f"Band of {quantity} over time",
+                        f"{quantity}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
         tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
                       note=f"{_of_sector(study)} {_of_mesh(study, tables)}".strip()),),
         sections=_sections(study, tables, fields, limits, has_fields=has_fields),
@@ -121,8 +121,8 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
         row = last_row(table)
         mean, low, high = (row[f"{prefix_of(row)}{column}"] for column in ("mean", "low", "high"))
         numbers.append(Number(f"{name} at the end", mean, low, high, interval_is=f"{percent} band"))
-    first = next(iter(tables.values()))
-    return (*numbers, *largest_share(last_row(first), shares_in(first, is_shared=study.result.is_shared)))
+    first_table = next(iter(tables.values()))
+    return (*numbers, *largest_share(last_row(first_table), shares_in(first_table, is_shared=study.result.is_shared)))
 
 
 def _next_step(study: EnsembleStudy, folder: Path, beside: Path) -> str:
@@ -130,8 +130,8 @@ def _next_step(study: EnsembleStudy, folder: Path, beside: Path) -> str:
     if result.without_spread:
         names = ", ".join(result.without_spread)
         return f"see whether the model uses the material that was replaced: all draws give the same {names}."
-    run, first = next(iter(study.prepared.settings.materials.values())), next(iter(result.curves))
-    target = f"ensemble:{folder}" + f":{first}" * (len(result.curves) > 1)
+    run, quantity = next(iter(study.prepared.settings.materials.values())), next(iter(result.curves))
+    target = f"ensemble:{folder}" + f":{quantity}" * (len(result.curves) > 1)
     design = f"tissuq design {shlex.quote(os.path.normpath(beside / run))} --target {shlex.quote(target)}"
     if result.failures:
         return (
@@ -140,8 +140,8 @@ def _next_step(study: EnsembleStudy, folder: Path, beside: Path) -> str:
         )
     if next(iter(study.prepared.ensembles.values())).origin:  # no test of the material was fitted that another adds to
         return "compare the band with a measurement of your own, if there is one."
-    beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))
-    if beyond is not None and beyond > MUCH_BEYOND:
+    share_beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))
+    if share_beyond is not None and share_beyond > MUCH_BEYOND:
         return f"measure up to the strains of the model: {design} says which test helps most"
     if result.draws < FEW_DRAWS:
         return f"make the band more accurate: repeat the command with --draws {FEW_DRAWS} and another --out."
@@ -164,7 +164,7 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
     frames = [table.assign(quantity=name) for name, table in tables.items()]
     everything = pd.concat(frames, ignore_index=True).drop(columns=["noise", "noise_error"], errors="ignore")
     everything.insert(0, "quantity", everything.pop("quantity"))
-    beyond = result.beyond
+    elements_beyond = result.beyond
     files: dict[str, Any] = {
         "quantities.csv": everything,
         "draws.csv": _draw_rows(study),
@@ -179,7 +179,7 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
             "failed": sum(failure.family == COMPLETE for failure in result.failures),
             "quantities": {name: _plain(last_row(table)) for name, table in tables.items()},
             "measured_invariants": {name: list(ensemble.most) for name, ensemble in prepared.ensembles.items()},
-            "elements_beyond": None if beyond is None else float(np.nanmean(beyond[1][:, -1])),
+            "elements_beyond": None if elements_beyond is None else float(np.nanmean(elements_beyond[1][:, -1])),
             "seconds": result.seconds,
             "cards": prepared.card_warnings,
             "warnings": study.warnings,
@@ -245,9 +245,9 @@ def _plain(row: dict[str, Any]) -> dict[str, Any]:
 def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]:
     percent = percent_of(min(table["draws"].iloc[-1] for table in tables.values()))
     shares = shares_in(next(iter(tables.values())), is_shared=study.result.is_shared)
-    first = next(iter(tables.values()))
+    first_table = next(iter(tables.values()))
     return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)] + (
-        ["on this mesh"] * is_mesh_free(first)
+        ["on this mesh"] * is_mesh_free(first_table)
     )
 
 
@@ -282,9 +282,9 @@ def _sections(
     prepared, result = study.prepared, study.result
     headers = _headers(study, tables)
     sections = [Section(f"{name} over time", _quantity(study, name, table, headers)) for name, table in tables.items()]
-    if shares_in(first := next(iter(tables.values())), is_shared=result.is_shared):
-        sentences = (*[SHARES] * result.is_shared, *[of_sources(first)] * bool(result.sources))
-        sentences += (OF_MESH,) * is_mesh_free(first)
+    if shares_in(first_table := next(iter(tables.values())), is_shared=result.is_shared):
+        sentences = (*[SHARES] * result.is_shared, *[of_sources(first_table)] * bool(result.sources))
+        sentences += (OF_MESH,) * is_mesh_free(first_table)
         sections.append(Section("Sources of uncertainty", sentences))
     materials = [
         [name, ensemble.model.experiment.name, ensemble.model.material.name, ensemble.model.discrepancy.name,
@@ -292,11 +292,11 @@ def _sections(
         for name, ensemble in prepared.ensembles.items()
     ]  # fmt: skip
     columns = ["material", "data", "law", "discrepancy", "measured I1 − 3 up to", "I2 − 3 up to"]
-    asked: tuple[Block, ...] = (Table(columns, materials, text_columns=(1, 2, 3)),)
+    blocks: tuple[Block, ...] = (Table(columns, materials, text_columns=(1, 2, 3)),)
     if fields and len(fields[0].invariants):
         words = "Invariants of the elements against those measured"
-        asked = (Picture("states", lambda: state_figure(result, fields, limits), words, STATES), *asked)
-    sections.append(Section("What the model asks of the material", asked))
+        blocks = (Picture("states", lambda: state_figure(result, fields, limits), words, STATES), *blocks)
+    sections.append(Section("What the model asks of the material", blocks))
     if result.failures:
         failures = tuple(
             Section(

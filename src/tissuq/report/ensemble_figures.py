@@ -98,17 +98,17 @@ def write_fields(path: Path, fields: Sequence[FinalFields]) -> None:
     """Write mean and standard deviation of displacement, von Mises stress and invariants over draws, for ParaView."""
     import meshio
 
-    first = fields[0]
+    first_draw = fields[0]
     points = {"displacement": np.stack([draw.displacement for draw in fields])}
-    if len(first.von_mises):
+    if len(first_draw.von_mises):
         points["von Mises stress"] = np.stack([draw.von_mises for draw in fields])
     cells = {}
-    if len(first.invariants):
+    if len(first_draw.invariants):
         cells["I1 - 3"], cells["I2 - 3"] = (np.stack([draw.invariants[:, axis] for draw in fields]) for axis in (0, 1))
-    ends = np.cumsum([len(members) for members in first.cells.values()])[:-1]
-    blocks = [(CELL_TYPES[kind][0], members) for kind, members in first.cells.items()]
+    ends = np.cumsum([len(members) for members in first_draw.cells.values()])[:-1]
+    blocks = [(CELL_TYPES[kind][0], members) for kind, members in first_draw.cells.items()]
     of_cells = {name: np.split(values, ends) for name, values in _moments(cells).items()}
-    meshio.Mesh(first.points, blocks, _moments(points), of_cells).write(path, file_format="vtu")
+    meshio.Mesh(first_draw.points, blocks, _moments(points), of_cells).write(path, file_format="vtu")
 
 
 def _moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:

@@ -84,18 +84,23 @@ def predictive_figure(
     """
     described = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     curves = next(iter(posteriors.values())).model.experiment.curves
-    panels = [(name, of) for name in posteriors for of in described[name]]
+    panels = [(name, described_curve) for name in posteriors for described_curve in described[name]]
     columns = columns_of(len(panels))
     with new_figure(WIDTHS[columns], 3.3 * -(-len(panels) // columns) + 0.5) as figure:
         drawn = on_figure(figure, len(panels), columns)
-        bands = [of.measurements if discrepancy else of.measurements_alone for _, of in panels]
+        bands = [
+            described_curve.measurements if discrepancy else described_curve.measurements_alone
+            for _, described_curve in panels
+        ]
         base = bands[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
         for index, (axis, (name, of_curve)) in enumerate(zip(drawn.axes, panels, strict=True)):
             posterior, curve, of_panel = posteriors[name], of_curve.curve, bands[index]
             inside = posterior.inside_bands(discrepancy=discrepancy)[index % len(curves)].sum()
             axis.set_title(f"{_label(posteriors, name, curve, drawn.letters)}{inside} of {len(curve)} inside")
             for indices, is_curve in of_curve.ways:
-                low, high, median = (of[indices] / unit.to_mpa for of in (of_panel.low, of_panel.high, of_panel.median))
+                low, high, median = (
+                    band_values[indices] / unit.to_mpa for band_values in (of_panel.low, of_panel.high, of_panel.median)
+                )
                 band(axis, of_panel.stretch[indices], low, high, is_path=is_curve, label="95 % predictive band")
                 line(axis, of_panel.stretch[indices], median, is_path=is_curve, label="predicted median")
                 if name != "none" and base:

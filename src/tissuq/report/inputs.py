@@ -39,7 +39,9 @@ def inputs_of(settings: SpecimenSettings, experiment: Experiment, sources: Seque
     relocated = _relocated(settings, experiment, sources, copy_of)
     relocated |= {"laws": tuple(names)} if several_laws else {"material": names[0]}
     without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
-    copies = {copy: file for file, copy in copy_of.items()} | {copy: law for _, of in laws for copy, law in of.items()}
+    copies = {copy: file for file, copy in copy_of.items()} | {
+        copy: law for _, law_copies in laws for copy, law in law_copies.items()
+    }
     options = "".join(f" --material {name}" for name in names) if names != named else ""
     recipe = settings.model_copy(update=relocated)
     return Inputs(copies, recipe, without | {"material"} if several_laws else without, options)

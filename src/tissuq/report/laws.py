@@ -113,9 +113,9 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
         remark = f"probability {_percent(float(table.probability[law]))}"
         numbers.append(Number("most probable law", law, remark=remark))
     best = str(table.elpd_difference.idxmin())
-    others = [law for law in study.close if law != best]
-    named_others = " and ".join(others) if len(others) < FEW_LAWS else f"{len(others)} others"
-    as_good = f"with its discrepancy as good: {named_others}" if others else "no other as good"
+    rivals = [law for law in study.close if law != best]
+    named_others = " and ".join(rivals) if len(rivals) < FEW_LAWS else f"{len(rivals)} others"
+    as_good = f"with its discrepancy as good: {named_others}" if rivals else "no other as good"
     stable = float(table.stable[best])
     but = f"; stable over the measured range with a probability of {_percent(stable)}" if stable < MIN_STABLE else ""
     return (*numbers, Number("best for left-out measurements", best, remark=as_good + but))
@@ -149,14 +149,14 @@ def law_lead(study: LawStudy) -> str:
     table, modulus = comparison.table_in("MPa"), comparison.modulus
     low, high = (significant(end / unit.to_mpa) for end in modulus.hdi())
     close = study.close
-    told = (
+    comparison_words = (
         f"of {len(table)} laws, only {close[0]} describes the measurements so well that no other is as good"
         if len(close) == 1
         else f"{len(close)} of {len(table)} laws, with the discrepancy '{study.settings.discrepancies[0]}', predict "
         f"left-out measurements equally well{_though(table.probability)}"
     )
     nearest = table.nrmse.dropna().nsmallest(1)
-    alone = [
+    misfit_words = [
         f" Alone, without discrepancy, {name} comes nearest to the measurements (error {100 * error:.1f} %)."
         for name, error in nearest.items()
     ]
@@ -164,7 +164,7 @@ def law_lead(study: LawStudy) -> str:
     return (
         f"The initial shear modulus, averaged over the laws, has the mean {mean} {unit.name}, 95 % HPD {low} to {high} "
         f"{unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
-        f"{told[0].upper()}{told[1:]}." + "".join(alone)
+        f"{comparison_words[0].upper()}{comparison_words[1:]}." + "".join(misfit_words)
     )
 
 

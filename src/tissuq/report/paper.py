@@ -102,9 +102,9 @@ def _listed(names: list[str]) -> str:
 def _numbers(summary: list[Row], held: list[str], passed: list[str]) -> tuple[Number, ...]:
     """Return the formulation that the evidence prefers with its C10, and how many intervals and checks hold."""
     numbers, count = [], len(summary)
-    known = [row for row in summary if row["log_evidence"] is not None]
-    if known:
-        row = max(known, key=lambda row: float(row["log_evidence"]))
+    weighed = [row for row in summary if row["log_evidence"] is not None]
+    if weighed:
+        row = max(weighed, key=lambda row: float(row["log_evidence"]))
         mean, low, high = (float(row[f"C10_{name}"]) for name in ("mean", "hdi_low", "hdi_high"))
         number = Number("", mean, low, high, "MPa", "95 % HPD")
         numbers.append(
@@ -152,15 +152,15 @@ def _sections(study: PaperStudy) -> tuple[Section, ...]:
 def _pair(study: PaperStudy, number: int, title: str) -> tuple[Block, ...]:
     """Return the two figures of a group: with the discrepancy, and the model alone."""
     shown = {name: study.main[name].posterior for name in GROUPS[number]}
-    of = ", the process conditioned on the data" if "gp" in shown else ""
-    with_it = f"Figure {number}. Predictive check with the discrepancy (eq. 27){of}."
-    alone = f"Figure {number + 1}. The model alone, without the discrepancy's share (eq. 28), same data."
+    condition = ", the process conditioned on the data" if "gp" in shown else ""
+    with_it = f"Figure {number}. Predictive check with the discrepancy (eq. 27){condition}."
+    without_it = f"Figure {number + 1}. The model alone, without the discrepancy's share (eq. 28), same data."
     words = title.lower()
     return (
         Picture(f"figure{number}", partial(_predictive, study, shown, discrepancy=True), f"Predictive bands: {words}",
                 with_it),
         Picture(f"figure{number + 1}", partial(_predictive, study, shown, discrepancy=False),
-                f"Bands of the model alone: {words}", alone),
+                f"Bands of the model alone: {words}", without_it),
     )  # fmt: skip
 
 

@@ -44,7 +44,9 @@ def headline(population: Population) -> tuple[str, float]:
 def headline_figure(population: Population, unit: StressUnit) -> Figure:
     """Return the panel of the headline, for the head of a page."""
     symbol, (words, ratio) = population.symbols[0], headline(population)
-    summary, specimens = (ratio * of(unit=unit.name) for of in (population.summary, population.specimen_summary))
+    summary, specimens = (
+        ratio * summary_of(unit=unit.name) for summary_of in (population.summary, population.specimen_summary)
+    )
     unit_name = population.unit_of(symbol, unit).name
     with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
         drawn = on_figure(figure, 1, 1)

@@ -65,8 +65,8 @@ def copy_of_covariates(study: PopulationStudy, beside: Path) -> tuple[dict[str, 
     if study.settings.covariates is None:
         return {}, {}
     source = beside / study.settings.covariates
-    place = f"{INPUT}/{COPY}{source.suffix}"
-    return {place: source}, {"covariates": place}
+    target = f"{INPUT}/{COPY}{source.suffix}"
+    return {target: source}, {"covariates": target}
 
 
 def needed_of(study: PopulationStudy) -> pd.DataFrame | None:

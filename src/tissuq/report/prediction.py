@@ -161,9 +161,9 @@ def _shares(prediction: Prediction) -> list[Number]:
         width = f"half width of the band {share_words(float(rows['half_width'].max()))}"
         remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
         numbers.append(Number("measurements inside the band", value, remark=remark))
-    beyond = count - int(prediction.is_calibrated.sum())
-    remark = "outside the measured range of I1 and I2" if beyond else "all within the measured range of I1 and I2"
-    numbers.append(Number("extrapolated", f"{beyond / count:.0%} of the points", remark=remark))
+    extrapolated = count - int(prediction.is_calibrated.sum())
+    remark = "outside the measured range of I1 and I2" if extrapolated else "all within the measured range of I1 and I2"
+    numbers.append(Number("extrapolated", f"{extrapolated / count:.0%} of the points", remark=remark))
     return numbers
 
 
@@ -189,10 +189,10 @@ def _caption(prediction: Prediction) -> str:
 def _tables(prediction: Prediction) -> tuple[Table, ...]:
     several, unit = len(prediction.stresses) > 1, prediction.unit.name
     text_column = (len(prediction.mode.controls),) if several else ()
-    alone = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
+    alone_words = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
     count = len(prediction.points)
-    part = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
-    note = f"{unit}, {', '.join(prediction.stresses)}. {alone}{part}".strip()
+    excerpt = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
+    note = f"{unit}, {', '.join(prediction.stresses)}. {alone_words}{excerpt}".strip()
     title = f"Stress in mode {prediction.mode.name}, {unit}"
     tables = [Table(band_headers(prediction), readable_bands(prediction), title, text_column, note)]
     if prediction.scores is not None and prediction.data is not None:
@@ -210,10 +210,10 @@ def _sections(prediction: Prediction) -> tuple[Section, ...]:
         "prediction", lambda: prediction_figure(prediction), f"All bands of the stress in mode {prediction.mode.name}",
         _caption(prediction), len(prediction.kinds) == 1,
     )  # fmt: skip
-    whole = " and an error of the whole test like theirs" if model.tolerances else ""
+    test_error = " and an error of the whole test like theirs" if model.tolerances else ""
     reading = [
         "The band of the stress is the uncertainty of the fitted material; that of measurements adds the noise of the "
-        f"run's measurements{whole}.",
+        f"run's measurements{test_error}.",
         "Calibrated: within the range in which both invariants I1 and I2 were measured (in a mode of the run, the "
         "stretches that were). Even inside that range one mode does not determine how the energy depends on the other "
         "invariant, so bands of other modes are wider than those of the measured mode.",
@@ -287,8 +287,8 @@ def _lead_of_bands(prediction: Prediction) -> str:
         return f"Extrapolated to {_point(prediction, farthest)}, {stresses}: {kind}."
     if not prediction.kinds[0]:
         return f"Predicted by {kind}."
-    alone = kind_words(prediction, kind=False)
-    return f"Predicted {kind}. There, for {alone}, {_stresses_at(prediction, index, kind=False)}."
+    material_words = kind_words(prediction, kind=False)
+    return f"Predicted {kind}. There, for {material_words}, {_stresses_at(prediction, index, kind=False)}."
 
 
 def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:

@@ -348,7 +348,7 @@ class Result:
 
     def record(self) -> Record:
         """Return everything but figures and files as it stands in result.json, with warnings in the form of a shell."""
-        known = most_severe_first(self.warnings)
+        warnings = most_severe_first(self.warnings)
         return {
             "title": self.title,
             "subject": self.subject,
@@ -356,7 +356,7 @@ class Result:
             "finding": self.finding,
             "uses": [{"purpose": use.purpose, "verdict": str(use.verdict), "reason": use.reason} for use in self.uses],
             "next": self.next_step,
-            "warnings": [{"code": w.code, "severity": str(w.severity), "text": w.shell} for w in known],
+            "warnings": [{"code": w.code, "severity": str(w.severity), "text": w.shell} for w in warnings],
             "tables": [table.record() for table in self.tables],
             "sections": [section.record() for section in self.sections],
         }

@@ -56,7 +56,7 @@ def sbc_result(settings: SbcSettings, results: list[dict[str, Any]]) -> Result:
     remark = f"p {_least_probability(worst):.2g}, of {2 * count} tests"
     left_out = [f"{failed} fits failed and are left out."] * bool(failed)
     priors = f"{'; '.join(f'{symbol}: {prior}' for symbol, prior in settings.chosen_priors.items())}."
-    every = Picture("ranks", lambda: _figure(settings, results), "ECDF differences of the ranks", CAPTION)
+    all_ranks = Picture("ranks", lambda: _figure(settings, results), "ECDF differences of the ranks", CAPTION)
     return Result(
         command="study sbc",
         title="Are the posteriors calibrated?",
@@ -76,7 +76,7 @@ def sbc_result(settings: SbcSettings, results: list[dict[str, Any]]) -> Result:
         ),
         tables=(Table(headers, rows, "Ranks of the truth", (1, 2)),),
         sections=(
-            Section("Every formulation", (every,)),
+            Section("Every formulation", (all_ranks,)),
             Section("How to read it", (CHECK, (*HOW_TO_READ, *left_out))),
             Section("Priors", (priors,)),
         ),
@@ -113,8 +113,8 @@ def _figure(settings: SbcSettings, results: list[dict[str, Any]], only: tuple[st
     panels: dict[tuple[str, str], dict[str, Any]] = {}
     for (formulation, noise, symbol), probabilities in probabilities_of(settings, results).items():
         if only in (None, (formulation, noise)):
-            known = np.sort(probabilities[np.isfinite(probabilities)])
-            panels.setdefault((formulation, noise), {})[symbol] = known
+            ranks = np.sort(probabilities[np.isfinite(probabilities)])
+            panels.setdefault((formulation, noise), {})[symbol] = ranks
     symbols = list(dict.fromkeys(symbol for lines in panels.values() for symbol in lines))
     across = min(MAX_COLUMNS, len(panels))
     down = -(-len(panels) // across)

@@ -128,14 +128,14 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     unit, factor = handy_unit(table, simulation.case.response_unit)
     mean, low, high = (last[f"{prefix_of(table)}{name}"] * factor for name in ("mean", "low", "high"))
     case = simulation.case
-    at = f"{case.response} at {case.travel_name} {case.shown(last[case.travel_column])}"
+    label = f"{case.response} at {case.travel_name} {case.shown(last[case.travel_column])}"
     numbers = [
-        Number(at, mean, low, high, unit, f"{percent_of(last['draws'])} band"),
+        Number(label, mean, low, high, unit, f"{percent_of(last['draws'])} band"),
         *largest_share(last, [name for name in SHARES if name in last], OF_MEASUREMENT),
     ]
-    beyond = _last_mean(simulation.energy_beyond)
-    if beyond is not None:
-        numbers.append(Number("energy strained beyond the measurements", f"{100 * beyond:.0f} %"))
+    energy_beyond = _last_mean(simulation.energy_beyond)
+    if energy_beyond is not None:
+        numbers.append(Number("energy strained beyond the measurements", f"{100 * energy_beyond:.0f} %"))
     return tuple(numbers)
 
 

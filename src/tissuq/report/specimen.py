@@ -205,8 +205,8 @@ def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:
     means = {name: study.posteriors[name].marginals[study.headline].mean / study.unit.to_mpa for name in _uncut(study)}
     ends = f"{significant(min(means.values()))} to {significant(max(means.values()))} {study.unit.name}"
     low, high = (end / study.unit.to_mpa for end in study.posteriors[study.main].marginals[study.headline].hdi())
-    beyond = ", ".join(name for name, mean in means.items() if not low <= mean <= high)
-    remark = f"beyond the interval above: {beyond}" if beyond else ""
+    outside = ", ".join(name for name, mean in means.items() if not low <= mean <= high)
+    remark = f"beyond the interval above: {outside}" if outside else ""
     return (Number(f"{study.headline} with {len(means)} discrepancies", ends, remark=remark),)
 
 

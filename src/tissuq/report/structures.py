@@ -113,10 +113,10 @@ def readable_structures(summary: pd.DataFrame) -> list[list[str]]:
 
 def _rows(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [
-        {"truth": row["truth"], "tests": row["replicate"] + 1, "structure": name, "force_N": found["force"]}
-        | {f"{kind}_{key}": value for kind in (DEFAULT, ORACLE) for key, value in found[kind].items()}
+        {"truth": row["truth"], "tests": row["replicate"] + 1, "structure": name, "force_N": estimates["force"]}
+        | {f"{kind}_{key}": value for kind in (DEFAULT, ORACLE) for key, value in estimates[kind].items()}
         for row in results
-        for name, found in row["structures"].items()
+        for name, estimates in row["structures"].items()
     ]
 
 
@@ -125,13 +125,23 @@ def _figure(results: list[dict[str, Any]]) -> Figure:
     names = list(dict.fromkeys((row["truth"], name) for row in results for name in row["structures"]))
     with new_figure(ANSWER_WIDTH, 1.1 + 1.7 * len(names)) as figure:
         for axis, (truth, name) in zip(figure.subplots(len(names), 1, squeeze=False)[:, 0], names, strict=True):
-            found = [row["structures"][name] for row in results if row["truth"] == truth and name in row["structures"]]
-            found.sort(key=lambda each: each[DEFAULT]["mean"] / each["force"])
-            at = np.arange(len(found))
+            estimates = [
+                row["structures"][name] for row in results if row["truth"] == truth and name in row["structures"]
+            ]
+            estimates.sort(key=lambda estimate: estimate[DEFAULT]["mean"] / estimate["force"])
+            positions = np.arange(len(estimates))
             for kind, color, shift in ((ORACLE, BASE, 0.3), (DEFAULT, BAND, 0.0)):
-                ends = np.array([[each[kind][end] / each["force"] for end in ("low", "high")] for each in found])
-                axis.vlines(at + shift, *ends.T, color=color, lw=1.6)
-            axis.plot(at, [each[DEFAULT]["mean"] / each["force"] for each in found], ".", color=BAND, ms=4)
+                ends = np.array(
+                    [[estimate[kind][end] / estimate["force"] for end in ("low", "high")] for estimate in estimates]
+                )
+                axis.vlines(positions + shift, *ends.T, color=color, lw=1.6)
+            axis.plot(
+                positions,
+                [estimate[DEFAULT]["mean"] / estimate["force"] for estimate in estimates],
+                ".",
+                color=BAND,
+                ms=4,
+            )
             axis.axhline(1, color=TRUTH, lw=1)
             axis.set_title(f"{truth}, {name}", fontsize=9)
             axis.set_xticks([])

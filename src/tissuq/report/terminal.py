@@ -36,8 +36,8 @@ def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]
     available = max(console.width, TEXT_WIDTH)
     longest = [max(map(cell_len, map(str, cells))) for cells in zip(headers, *rows, strict=True)]
     is_prose = [length > PROSE for length in longest]
-    least = [PROSE if prose else length for length, prose in zip(longest, is_prose, strict=True)]
-    for number, columns in enumerate(_side_by_side(least, available)):
+    widths = [PROSE if prose else length for length, prose in zip(longest, is_prose, strict=True)]
+    for number, columns in enumerate(_side_by_side(widths, available)):
         table = Table(title=title * (not number), title_justify="left", title_style="bold", box=SIMPLE_HEAD,
                       padding=(0, 1, 0, 0), pad_edge=False)  # fmt: skip
         for index in columns:
@@ -45,7 +45,7 @@ def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]
             table.add_column(headers[index], justify=justify, no_wrap=not is_prose[index])
         for row in rows:
             table.add_row(*(str(row[index]) for index in columns))
-        needed = sum(least[index] + GAP for index in columns)
+        needed = sum(widths[index] + GAP for index in columns)
         console.width = max(available, needed)  # truncated numbers would mislead
         console.print(table)
 
@@ -86,8 +86,8 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     details : bool
         All warnings, and the sections that a page folds.
     """
-    shown, others = few_and_others(record)
-    shown, others = (shown + others, []) if details else (shown, others)
+    shown, folded = few_and_others(record)
+    shown, folded = (shown + folded, []) if details else (shown, folded)
     print_warnings([warning["text"] for warning in shown if warning["severity"] == Severity.PROBLEM])
     print(f"\n{record['title']}")
     _print_numbers(record["numbers"])
@@ -110,9 +110,9 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
             _print_table(table)
     if folder is None:
         return
-    if not details and (others or record["sections"]):
+    if not details and (folded or record["sections"]):
         titles = ", ".join(section["title"] for section in record["sections"])
-        count = f"{titles and '; '}further warnings and notes ({len(others)})" if others else ""
+        count = f"{titles and '; '}further warnings and notes ({len(folded)})" if folded else ""
         words = f"{titles}{count}: tissuq show {shlex.quote(str(folder))} --details"
         print(fill(words, TEXT_WIDTH, subsequent_indent="  ", break_on_hyphens=False))
     print(f"Report: {folder / 'report.html'}")

@@ -123,8 +123,8 @@ def _sections(
     sections = [Section("By class of tissue", (figure,)), Section("How to read it", (tuple(reading),))]
     if failures := _failures(results):
         sections.append(Section("Not predicted", (tuple(failures),)))
-    own = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
-    return (*sections, Section("Sets", (f"{', '.join(sets)}{own}.",)))
+    origin = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
+    return (*sections, Section("Sets", (f"{', '.join(sets)}{origin}.",)))
 
 
 def readable_tissues(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]:

@@ -46,9 +46,9 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> Recor
         write_figures(folder, pictures)
     record = result.record()
     write_json(folder / RESULT, record)
-    shown, others = few_and_others(record)
+    shown, folded = few_and_others(record)
     of_chart = result.picture.chart if figures and result.picture is not None else None
-    write_page(folder, result=result, record=record, shown=shown, others=others, command=command,
+    write_page(folder, result=result, record=record, shown=shown, others=folded, command=command,
                chart_data=of_chart() if of_chart else None)  # fmt: skip
     return record
 
@@ -94,8 +94,8 @@ def read_record(folder: Path) -> Record:
 def _is_of(value: Any, kind: Any) -> bool:
     """Return whether what was read has all that a type says."""
     if is_typeddict(kind):
-        parts = get_type_hints(kind)
-        return isinstance(value, dict) and all(name in value and _is_of(value[name], parts[name]) for name in parts)
+        hints = get_type_hints(kind)
+        return isinstance(value, dict) and all(name in value and _is_of(value[name], hints[name]) for name in hints)
     if get_origin(kind) is list:
         return isinstance(value, list) and all(_is_of(item, get_args(kind)[0]) for item in value)
     return isinstance(value, kind)
