@@ -175,39 +175,44 @@ def node_sets(files: Sequence[bytes]) -> dict[str, set[int]]:
         When a set names one that no file defines, or its numbers are not understood.
     """
     sets: dict[str, set[int]] = {}
-    parts: dict[str, set[str]] = {}
+    references: dict[str, set[str]] = {}
     for content in files:
         for keyword in keywords_of(content):
             name = keyword.parameters.get("NSET", "").upper()
             if keyword.name not in ("NSET", "NODE") or not name:
                 continue
-            members, names = sets.setdefault(name, set()), parts.setdefault(name, set())
+            members, names = sets.setdefault(name, set()), references.setdefault(name, set())
             try:
-                numbers, others = _members(keyword)
+                numbers, referenced = _members(keyword)
             except (ValueError, TypeError) as error:
                 raise InputError(f"the numbers of the set of nodes '{name}' are not understood ({error}).") from error
             members |= numbers
-            names |= others
-    gone = _of_instances(parts)
+            names |= referenced
+    gone = _of_instances(references)
     for name in gone:
-        del sets[name], parts[name]
-    for name, others in parts.items():
-        for unknown in sorted(others - set(sets)):
+        del sets[name], references[name]
+    for name, referenced in references.items():
+        for unknown in sorted(referenced - set(sets)):
             raise InputError(f"the set of nodes '{name}' has '{unknown}', which no file of the deck defines.")
-    while any(not sets[part] <= sets[name] for name, others in parts.items() for part in others):
-        for name, others in parts.items():
-            sets[name].update(*(sets[part] for part in others))
+    while any(not sets[reference] <= sets[name] for name, referenced in references.items() for reference in referenced):
+        for name, referenced in references.items():
+            sets[name].update(*(sets[reference] for reference in referenced))
     return sets
 
 
-def _of_instances(parts: Mapping[str, set[str]]) -> set[str]:
+def _of_instances(references: Mapping[str, set[str]]) -> set[str]:
     """Return the sets with sets of instances in them, as PART-1-1.TOP, whose numbers only a result file tells."""
-    found: set[str] = set()
+    unresolved: set[str] = set()
     while (
-        more := {name for name, others in parts.items() if any("." in part or part in found for part in others)} - found
+        more := {
+            name
+            for name, referenced in references.items()
+            if any("." in reference or reference in unresolved for reference in referenced)
+        }
+        - unresolved
     ):
-        found |= more
-    return found
+        unresolved |= more
+    return unresolved
 
 
 def _members(keyword: Keyword) -> tuple[set[int], set[str]]:
@@ -222,6 +227,6 @@ def _members(keyword: Keyword) -> tuple[set[int], set[str]]:
         }
     numbers: set[int] = set()
     for row in rows:
-        first, last, step = (*map(int, row), 1)[:3]
-        numbers |= set(range(first, last + 1, step))
+        start, stop, step = (*map(int, row), 1)[:3]
+        numbers |= set(range(start, stop + 1, step))
     return numbers, set()

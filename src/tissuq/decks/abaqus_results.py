@@ -62,29 +62,37 @@ class AbaqusResults(ResultFile):
         fields = self._table((request,))["fields"]
         if request not in fields:
             raise InputError(unknown_set(set_name, self.node_sets))
-        found = fields[request]
-        if found is None:
+        field = fields[request]
+        if field is None:
             return None
         width = len(TENSOR) if kind == "S" else 3
-        is_within = np.array(found["times"]) <= self.results.last_time * (1 + 1e-5)
-        rows = [[row or [np.nan] * width for row in rows] for rows in found["rows"]]
-        return Values(np.array(found["times"])[is_within], np.array(rows, dtype=np.float64)[is_within])
+        is_within = np.array(field["times"]) <= self.results.last_time * (1 + 1e-5)
+        rows = [[row or [np.nan] * width for row in rows] for rows in field["rows"]]
+        return Values(np.array(field["times"])[is_within], np.array(rows, dtype=np.float64)[is_within])
 
     def _table(self, requests: tuple[str, ...]) -> Mapping[str, Any]:
         """Return the table, written anew where it lacks a request."""
         target = self.path.with_name(self.path.name + SUFFIX)
         stored = _stored(target)
         if stored is None or not set(requests) <= set(stored["asked"]):
-            asked = sorted({*requests, *(f"{kind}@{name}" for kind, name in self.results.asked)})
-            self._write(target, asked)
+            all_requests = sorted({*requests, *(f"{kind}@{name}" for kind, name in self.results.asked)})
+            self._write(target, all_requests)
             written = _stored(target) or {"sets": [], "fields": {}}
-            stored = {**written, "asked": asked}
+            stored = {**written, "asked": all_requests}
             target.write_text(json.dumps(stored), encoding="utf-8")
         return stored
 
-    def _write(self, target: Path, asked: list[str]) -> None:
+    def _write(self, target: Path, requests: list[str]) -> None:
         program, *words = shlex.split(self.results.program) or ["abaqus"]
-        command = [shutil.which(program) or program, *words, "python", str(SCRIPT), self.path.name, target.name, *asked]
+        command = [
+            shutil.which(program) or program,
+            *words,
+            "python",
+            str(SCRIPT),
+            self.path.name,
+            target.name,
+            *requests,
+        ]
         advice = "Name the program that opens it with --abaqus 'abaqus', or give the quantity by a function of yours."
         try:
             done = subprocess.run(  # noqa: S603  (the user's program, without a shell)
@@ -103,7 +111,7 @@ class AbaqusResults(ResultFile):
 def _stored(target: Path) -> dict[str, Any] | None:
     """Return what is in a table; None where there is none, or it was cut short."""
     try:
-        found = json.loads(target.read_text(encoding="utf-8"))
+        table = json.loads(target.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return {"asked": (), **found} if isinstance(found, dict) and "fields" in found else None
+    return {"asked": (), **table} if isinstance(table, dict) and "fields" in table else None

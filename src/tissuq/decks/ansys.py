@@ -130,9 +130,9 @@ def _parameters(content: bytes, names: Collection[str]) -> list[tuple[str, str]]
     return values
 
 
-def _component(name: str, below: bytes, count: int) -> set[int]:
+def _component(name: str, body: bytes, count: int) -> set[int]:
     """Return the members of a component from what stands below its head: their format, and a number of entries."""
-    lines = (line.text.rstrip() for line in lines_of(below))
+    lines = (line.text.rstrip() for line in lines_of(body))
     form = re.search(r"i(\d+)", next(lines, ""), re.IGNORECASE)
     if form is None:
         raise InputError(f"the component '{name}' of the deck (CMBLOCK) lacks the format of its numbers, as (8i10).")
@@ -144,8 +144,8 @@ def _component(name: str, below: bytes, count: int) -> set[int]:
     except (StopIteration, ValueError) as error:
         raise InputError(f"the component '{name}' of the deck (CMBLOCK) is cut short or damaged.") from error
     members: set[int] = set()
-    for before, entry in zip([0, *entries], entries, strict=False):
-        members |= {entry} if entry > 0 else set(range(before, -entry + 1))
+    for previous, entry in zip([0, *entries], entries, strict=False):
+        members |= {entry} if entry > 0 else set(range(previous, -entry + 1))
     return members
 
 

@@ -100,13 +100,13 @@ class CalculiXResults(ResultFile):
                     columns = dict(zip(table.columns, np.moveaxis(table.values, -1, 0), strict=True))
                     return Values(table.times, _components(columns, kind))
                 is_local = True
-        found = super().of_set(kind, set_name, how)
-        if found is None and is_local:
+        values = super().of_set(kind, set_name, how)
+        if values is None and is_local:
             raise InputError(
                 f"'{self.path.stem}.dat' has it in the axes of *TRANSFORM: add GLOBAL=YES to '*NODE PRINT, "
                 f"NSET={set_name}', or write *NODE FILE, too."
             )
-        return found
+        return values
 
 
 def _components(columns: Mapping[str, FloatArray], kind: str) -> FloatArray:

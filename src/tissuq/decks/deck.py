@@ -276,10 +276,10 @@ class Deck:
             file, material = self._placed(wanted)
             end_of_line = b"\r\n" if b"\r\n" in self.files[file] else b"\n"
             text = encoded(self.format.fragment(material, block)).replace(b"\n", end_of_line)
-            first, *others = material.spans
-            edits.setdefault(file, []).append((*first, text))
-            edits[file] += [(*span, b"") for span in others]
-        return {file: _edited(self.files[file], sorted(parts)) for file, parts in edits.items()}
+            main_span, *more_spans = material.spans
+            edits.setdefault(file, []).append((*main_span, text))
+            edits[file] += [(*span, b"") for span in more_spans]
+        return {file: _edited(self.files[file], sorted(file_edits)) for file, file_edits in edits.items()}
 
     def diff(self, changed: Mapping[str, bytes]) -> str:
         """Return the difference of the files that change, as ``diff -u`` shows it."""
@@ -297,8 +297,8 @@ class Deck:
                 raise InputError(f"material '{wanted}' in '{matching[0][0]}': {matching[0][1].refused}")
             return matching[0]
         if matching:
-            places = ", ".join(f"'{file}'" for file, _ in matching)
-            raise InputError(f"the model '{self.main}' has {len(matching)} materials '{wanted}' (in {places}).")
+            file_names = ", ".join(f"'{file}'" for file, _ in matching)
+            raise InputError(f"the model '{self.main}' has {len(matching)} materials '{wanted}' (in {file_names}).")
         names = ", ".join(material.label for _, material in self.materials()) or "none that is known"
         outside = f" Files with absolute names were not looked at: {', '.join(self.outside)}." if self.outside else ""
         raise InputError(f"the model '{self.main}' has no material '{wanted}'; its materials are {names}.{outside}")
@@ -331,15 +331,15 @@ def _recognised(file: Path, content: bytes) -> DeckFormat:
     raise InputError(f"'{file.name}' looks like no known deck: say which it is with --deck {'|'.join(deck_formats())}.")
 
 
-def _difference(file: str, before: list[str], after: list[str]) -> list[str]:
+def _difference(file: str, old_lines: list[str], new_lines: list[str]) -> list[str]:
     """Return the difference of the lines of a file, of which the equal ones at its start and end are not compared."""
-    pairs = enumerate(zip(before, after, strict=False))
-    equal = next((index for index, (old, new) in pairs if old != new), min(len(before), len(after)))
-    backwards = enumerate(zip(before[:equal:-1], after[:equal:-1], strict=False))
-    tail = next((index for index, (old, new) in backwards if old != new), min(len(before), len(after)) - equal)
+    pairs = enumerate(zip(old_lines, new_lines, strict=False))
+    equal = next((index for index, (old, new) in pairs if old != new), min(len(old_lines), len(new_lines)))
+    backwards = enumerate(zip(old_lines[:equal:-1], new_lines[:equal:-1], strict=False))
+    tail = next((index for index, (old, new) in backwards if old != new), min(len(old_lines), len(new_lines)) - equal)
     start, end = max(0, equal - CONTEXT), max(0, tail - CONTEXT)
-    parts = before[start : len(before) - end], after[start : len(after) - end]
-    difference = unified_diff(*parts, f"{file} (the model)", f"{file} (a draw)", n=CONTEXT, lineterm="")
+    excerpts = old_lines[start : len(old_lines) - end], new_lines[start : len(new_lines) - end]
+    difference = unified_diff(*excerpts, f"{file} (the model)", f"{file} (a draw)", n=CONTEXT, lineterm="")
     return [
         HUNK.sub(lambda match: f"{match[1]}{int(match[2]) + start}", line) if line[:2] == "@@" else line
         for line in difference
@@ -347,8 +347,8 @@ def _difference(file: str, before: list[str], after: list[str]) -> list[str]:
 
 
 def _edited(content: bytes, edits: list[tuple[int, int, bytes]]) -> bytes:
-    parts, at = [], 0
+    pieces, position = [], 0
     for start, end, text in edits:
-        parts += [content[at:start], text]
-        at = end
-    return b"".join([*parts, content[at:]])
+        pieces += [content[position:start], text]
+        position = end
+    return b"".join([*pieces, content[position:]])

@@ -123,15 +123,17 @@ class _Parsed:
             self._kept[name] = (self._kept[name][0], self._end())
         if name == "material" and self._stack[-1:] == ["Material"]:
             end = self._end()
-            text, *kept = (decoded(self.content[slice(*span)]) for span in ((self._start, end), *self._kept.values()))
-            self.materials.append(_material(text, kept, self._attributes, (self._start, end)))
+            text, *elements = (
+                decoded(self.content[slice(*span)]) for span in ((self._start, end), *self._kept.values())
+            )
+            self.materials.append(_material(text, elements, self._attributes, (self._start, end)))
 
     def _end(self) -> int:
         """Return where the element ends that is being closed: its closing tag, or one that closes itself."""
         return self.content.index(b">", self._parser.CurrentByteIndex) + 1
 
 
-def _material(text: str, kept: list[str], attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
+def _material(text: str, elements: list[str], attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
     head = text[: text.index(">") + 1]
     if head.endswith("/>"):
         head = head[:-2].rstrip() + ">"
@@ -140,5 +142,5 @@ def _material(text: str, kept: list[str], attributes: dict[str, str], span: tupl
     if NOT_ELASTIC_ALONE.search(kind):
         refused = f"type '{kind}' does more than an elastic material, {MORE_THAN_ELASTIC}"
     return DeckMaterial(
-        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, *kept), refused,
+        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, *elements), refused,
     )  # fmt: skip

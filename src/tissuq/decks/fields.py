@@ -85,9 +85,9 @@ def element_invariants(frd: Frd, step: int) -> FloatArray:
     squared_volume = np.linalg.det(np.moveaxis(right, -1, 0))
     trace, square = np.einsum("iin->n", right), np.einsum("ijn,jin->n", right, right)
     with np.errstate(invalid="ignore"):
-        first = trace / np.cbrt(squared_volume) - 3
-        second = (trace**2 - square) / (2 * np.cbrt(squared_volume) ** 2) - 3
-    at_nodes = np.stack([first, second], axis=1)
+        I1_minus_3 = trace / np.cbrt(squared_volume) - 3
+        I2_minus_3 = (trace**2 - square) / (2 * np.cbrt(squared_volume) ** 2) - 3
+    at_nodes = np.stack([I1_minus_3, I2_minus_3], axis=1)
     return np.concatenate([at_nodes[members].mean(axis=1) for members, _ in frd.cells.values()])
 
 

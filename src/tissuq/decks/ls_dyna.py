@@ -55,9 +55,9 @@ class LSDynaDeck(DeckFormat):
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
         title, number, density = material.remains
-        keyword, name, names, row, *others = block.splitlines()
+        keyword, name, names, row, *more_rows = block.splitlines()
         numbered = f"{number:>{LONG}}{density:>{LONG}}{row[2 * LONG :]}"
-        return "\n".join([keyword, title or name, names, numbered, *others, ""])
+        return "\n".join([keyword, title or name, names, numbered, *more_rows, ""])
 
 
 def _blocks(content: bytes) -> list[list[Line]]:

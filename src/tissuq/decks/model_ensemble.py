@@ -118,7 +118,9 @@ class ModelEnsemble:
         times, families = self.times[quantity], self.curves[quantity]
         complete = families[COMPLETE]
         shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time", self.sources)
-        names = [name for name in (*SHARES, "discrepancy_sd", *(f"alone_{part}" for part in BAND)) if name in shared]
+        names = [
+            name for name in (*SHARES, "discrepancy_sd", *(f"alone_{column}" for column in BAND)) if name in shared
+        ]
         errors = [f"{name}_error" for name in names if f"{name}_error" in shared]
         return table.assign(**{name: shared[name] for name in (*names, *errors)}, shared_draws=shared["draws"])
 
@@ -193,8 +195,8 @@ def _mesh_changes(task: ModelRun, fine: Mapping[str, Any], complete: Sequence[Ma
     reasons = [(fine, "on the finer mesh"), (coarse, "on the mesh")]
     problem = next(
         (
-            f"draw {task.number + 1} {where}: {reason}"
-            for result, where in reasons
+            f"draw {task.number + 1} {mesh_words}: {reason}"
+            for result, mesh_words in reasons
             if (reason := result["problem"] or result["misread"])
         ),
         "" if all(changes.values()) and changes else "the quantity is zero",
@@ -207,7 +209,7 @@ def _sources(ensembles: Collection[Ensemble]) -> dict[str, FloatArray]:
     columns: dict[str, list[FloatArray]] = {}
     for ensemble in ensembles:
         for name, values in ensemble.sources.items():
-            if not any(np.array_equal(values, others) for others in columns.setdefault(name, [])):
+            if not any(np.array_equal(values, earlier) for earlier in columns.setdefault(name, [])):
                 columns[name].append(values)
     return {name: np.concatenate(values, axis=1) for name, values in columns.items()}
 
@@ -225,7 +227,9 @@ def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
     >>> times.tolist(), values.tolist()
     ([0.5, 1.0], [[2.0, 4.0], [3.0, nan], [nan, nan]])
     """
-    pairs = [None if curve is None else tuple(np.asarray(part, dtype=np.float64) for part in curve) for curve in curves]
+    pairs = [
+        None if curve is None else tuple(np.asarray(column, dtype=np.float64) for column in curve) for curve in curves
+    ]
     present = [pair for pair in pairs if pair is not None and len(pair[0])]
     longest = max((times for times, _ in present), key=lambda times: (times[-1], len(times)))
     is_prefix = all(

@@ -74,26 +74,26 @@ def extra_files(deck: Deck, also: Sequence[str], beside: Path) -> dict[str, Path
     """
     extra: dict[str, Path] = {}
     for file in (beside / name for name in also):
-        place = deck_folder(deck) + file.name
+        path = deck_folder(deck) + file.name
         if not os.path.isfile(file):
             raise InputError(f"there is no file '{file}' to go with the model (--also).")
         if included_place(deck, file) is not None:
             continue
-        if place in deck.files and deck.files[place] != file.read_bytes():
+        if path in deck.files and deck.files[path] != file.read_bytes():
             raise InputError(f"'{file}' would take the place of a file of the model (--also).")
-        if place in extra and not filecmp.cmp(extra[place], file, False):
+        if path in extra and not filecmp.cmp(extra[path], file, False):
             raise InputError(f"two files called '{file.name}' are to go with the model (--also): rename one.")
-        if place not in deck.files:
-            extra[place] = file
+        if path not in deck.files:
+            extra[path] = file
     return extra
 
 
 def stored_place(deck: Deck, file: Path) -> str:
     """Return where a file that goes with the deck is in the folder of an ensemble, or its absolute name."""
-    place = included_place(deck, file)
-    if place is None:
-        place = deck_folder(deck) + file.name
-    return place if os.path.isabs(place) else f"{MODEL}/{place}"
+    path = included_place(deck, file)
+    if path is None:
+        path = deck_folder(deck) + file.name
+    return path if os.path.isabs(path) else f"{MODEL}/{path}"
 
 
 def included_place(deck: Deck, file: Path) -> str | None:
@@ -101,8 +101,8 @@ def included_place(deck: Deck, file: Path) -> str | None:
     absolute = Path(os.path.abspath(file))
     if any(Path(os.path.abspath(name)) == absolute for name in deck.outside):
         return str(absolute)
-    place = absolute.relative_to(deck.root).as_posix() if absolute.is_relative_to(deck.root) else ""
-    return place if place in deck.files else None
+    path = absolute.relative_to(deck.root).as_posix() if absolute.is_relative_to(deck.root) else ""
+    return path if path in deck.files else None
 
 
 def _digest(file: Path) -> str:

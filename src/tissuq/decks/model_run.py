@@ -86,8 +86,8 @@ class ModelRun:
     @property
     def solver_key(self) -> str:
         """A digest of all that the solver's run depends on."""
-        parts = (self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
-        return _digest(*parts, *([self.mesh] if self.mesh else []))
+        inputs = (self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
+        return _digest(*inputs, *([self.mesh] if self.mesh else []))
 
     @property
     def key(self) -> str:
@@ -117,17 +117,19 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     deck = task.deck
     job_folder = task.folder / PurePosixPath(task.main).parent
     sets = sets_of(deck, task.quantities)
-    asked = tuple((quantity.kind, quantity.set_name) for quantity in task.quantities if isinstance(quantity, Component))
+    components = tuple(
+        (quantity.kind, quantity.set_name) for quantity in task.quantities if isinstance(quantity, Component)
+    )
     program = task.abaqus or shlex.quote(task.solver.words(deck.job, deck.main)[0])
-    is_ring = any(kind == "RF" for kind, _ in asked) and deck.format.is_axisymmetric(list(deck.files.values()))
-    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets, asked, program, is_ring)
+    is_ring = any(kind == "RF" for kind, _ in components) and deck.format.is_axisymmetric(list(deck.files.values()))
+    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets, components, program, is_ring)
     curves, misread = _curves(task, results)
-    beyond = None
+    elements_beyond = None
     if not misread and not stored["problem"]:
-        misread, beyond = _saved_fields(task, results)
+        misread, elements_beyond = _saved_fields(task, results)
     if not task.keep:
         _strip(task.folder)
-    return {**stored, "curves": curves, "misread": misread, "beyond": beyond, "folder": task.folder.name}
+    return {**stored, "curves": curves, "misread": misread, "beyond": elements_beyond, "folder": task.folder.name}
 
 
 def clear_unfinished(folder: Path) -> None:
@@ -167,10 +169,12 @@ def check_sets(deck: Deck, quantities: Iterable[Quantity], solver: Solver | None
     for quantity in quantities if not deck.outside else ():
         if isinstance(quantity, Component) and quantity.set_name != ALL:
             of_elements = quantity.kind in ("S", "E")
-            known = deck.format.set_names(list(deck.files.values()), of_elements=of_elements)
-            if known and quantity.set_name.rpartition(".")[2] not in known:  # those of instances are PART-1-1.TOP
-                raise InputError(f"{quantity.text}: {unknown_set(quantity.set_name, known)}")
-            if known and of_elements and isinstance(solver, CalculiXSolver):
+            set_names = deck.format.set_names(list(deck.files.values()), of_elements=of_elements)
+            if (
+                set_names and quantity.set_name.rpartition(".")[2] not in set_names
+            ):  # those of instances are PART-1-1.TOP
+                raise InputError(f"{quantity.text}: {unknown_set(quantity.set_name, set_names)}")
+            if set_names and of_elements and isinstance(solver, CalculiXSolver):
                 _check_printed(deck, quantity)
 
 
@@ -186,8 +190,8 @@ def _check_printed(deck: Deck, quantity: Component) -> None:
         )
 
 
-def _digest(*parts: object) -> str:
-    return sha256(repr(parts).encode()).hexdigest()[:24]
+def _digest(*contents: object) -> str:
+    return sha256(repr(contents).encode()).hexdigest()[:24]
 
 
 def _stored(task: ModelRun) -> dict[str, Any] | None:
@@ -271,8 +275,8 @@ def _saved_fields(task: ModelRun, results: Results) -> tuple[str, Any]:
     if frd is None or fields is None:
         return "", None
     fields.save(task.folder / FIELDS)
-    beyond = share_beyond(frd, dict(task.limits))
-    return "", None if beyond is None else [beyond.times.tolist(), beyond.values.tolist()]
+    share = share_beyond(frd, dict(task.limits))
+    return "", None if share is None else [share.times.tolist(), share.values.tolist()]
 
 
 def _strip(folder: Path) -> None:

@@ -19,32 +19,32 @@ def name_of(instance):
 
 def node_sets(odb):
     """Return the nodes of every set as pairs of instance and label, by its name in capitals."""
-    found = {}
+    sets = {}
     assembly = odb.rootAssembly
     for instance in assembly.instances.values():
         for name in instance.nodeSets.keys():
             members = members_of(instance.nodeSets[name])
-            found[(instance.name + "." + name).upper()] = members
-            found.setdefault(name.upper(), set()).update(members)
+            sets[(instance.name + "." + name).upper()] = members
+            sets.setdefault(name.upper(), set()).update(members)
     for name in assembly.nodeSets.keys():  # which is meant, where parts have a set of its name
-        found[name.strip().upper()] = members_of(assembly.nodeSets[name])
-    return found
+        sets[name.strip().upper()] = members_of(assembly.nodeSets[name])
+    return sets
 
 
 def members_of(node_set):
     """Return the nodes of a set, which of the assembly has an array an instance, and of an instance one."""
     members = set()
-    for part in node_set.nodes:
-        for node in [part] if hasattr(part, "label") else part:
+    for entry in node_set.nodes:
+        for node in [entry] if hasattr(entry, "label") else entry:
             members.add((name_of(node.instanceName), int(node.label)))
     return members
 
 
 def rows_of(field, kind, members):
     """Return components at the members, in their order: means over the elements at a node, or None."""
-    places = {}
-    for place, member in enumerate(members or ()):
-        places[member] = place
+    indices = {}
+    for index, member in enumerate(members or ()):
+        indices[member] = index
     columns = {}
     for column, label in enumerate(field.componentLabels):
         columns[label[len(kind) :]] = column
@@ -53,19 +53,19 @@ def rows_of(field, kind, members):
         instance = name_of(block.instance)
         for label, values in zip(block.nodeLabels, block.data):
             member = (instance, int(label))
-            if member not in places:
+            if member not in indices:
                 if members is not None:
                     continue
-                places[member] = len(places)
-            place = places[member]
-            while len(sums) <= place:
+                indices[member] = len(indices)
+            index = indices[member]
+            while len(sums) <= index:
                 sums.append([0.0] * len(COMPONENTS[kind]))
                 counts.append(0)
-            counts[place] += 1
+            counts[index] += 1
             for row, component in enumerate(COMPONENTS[kind]):
                 if component in columns:
-                    sums[place][row] += float(values[columns[component]])
-    count = len(places)
+                    sums[index][row] += float(values[columns[component]])
+    count = len(indices)
     sums += [[0.0]] * (count - len(sums))
     counts += [0] * (count - len(counts))
     return [[value / number for value in row] if number else None for row, number in zip(sums, counts)]

@@ -130,16 +130,16 @@ class Component(Quantity):
     def _read(self, results: Results) -> Curve:
         file = results.file
         if file is None:
-            known = ", ".join(suffix for kind in result_files() for suffix in kind.suffixes)
+            suffixes = ", ".join(suffix for kind in result_files() for suffix in kind.suffixes)
             raise InputError(
-                f"{self.text}: the run of '{results.job}' left no file that can be read ({known}); {OWN_FUNCTION}."
+                f"{self.text}: the run of '{results.job}' left no file that can be read ({suffixes}); {OWN_FUNCTION}."
             )
         try:
-            found = file.of_set(self.kind, self.set_name, self.how)
+            values = file.of_set(self.kind, self.set_name, self.how)
         except InputError as error:
             raise InputError(f"{self.text}: {error}") from error
-        if found is not None:
-            return Curve(found.times, self._over_set(found.values))
+        if values is not None:
+            return Curve(values.times, self._over_set(values.values))
         request = file.requests.get(self.kind, "").format(set=self.set_name)
         advice = f"ask for it in the deck, as by '{request}'" if request else f"this program has none; {OWN_FUNCTION}"
         raise InputError(f"{self.text} is not in {file.label}: {advice}.")
@@ -208,7 +208,7 @@ class FunctionQuantity(Quantity):
         try:
             returned = function(results.folder)
             times, values = returned if isinstance(returned, tuple) else (np.nan, returned)
-            curve = Curve(*(np.atleast_1d(np.asarray(part, dtype=np.float64)) for part in (times, values)))
+            curve = Curve(*(np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in (times, values)))
         except Exception as error:  # whatever the user's function does
             raise InputError(
                 f"quantity '{self.name}': {self.location} raised {type(error).__name__}: {error}"

@@ -68,15 +68,15 @@ class Results:
     @cached_property
     def file(self) -> ResultFile | None:
         """The result file that is there; None where none is that can be read."""
-        found = [
-            (place, kind, path)
+        candidates = [
+            (rank, kind, path)
             for kind in result_files()
-            for place, suffix in enumerate(kind.suffixes)
+            for rank, suffix in enumerate(kind.suffixes)
             if (path := self._with_suffix(suffix)) is not None
         ]
-        if not found:
+        if not candidates:
             return None
-        _, kind, path = min(found, key=lambda each: each[0])
+        _, kind, path = min(candidates, key=lambda candidate: candidate[0])
         return kind(path, self)
 
     def _with_suffix(self, suffix: str) -> Path | None:
@@ -146,8 +146,8 @@ class ResultFile(ABC):
         InputError
             When there is no such set.
         """
-        found = self.field(kind)
-        return None if found is None else Values(found.times, found.values[:, self._rows(set_name)])
+        values = self.field(kind)
+        return None if values is None else Values(values.times, values.values[:, self._rows(set_name)])
 
     def _rows(self, set_name: str) -> NDArray[np.bool_]:
         members = self.node_sets.get(set_name)
@@ -159,11 +159,11 @@ class ResultFile(ABC):
         return rows
 
 
-def unknown_set(set_name: str, known: Collection[str]) -> str:
+def unknown_set(set_name: str, set_names: Collection[str]) -> str:
     """Return what is said of a set that is none of those known: the nearest names, and some of the others."""
-    near = get_close_matches(set_name, known, n=3)
+    near = get_close_matches(set_name, set_names, n=3)
     hint = f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
-    names = sorted(known)
+    names = sorted(set_names)
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     listed = f"{', '.join(names[:MOST_NAMES]) or 'none'}{more}"
     return f"the model has no set of nodes '{set_name}'; its sets are {listed}.{hint}"

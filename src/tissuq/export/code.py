@@ -185,7 +185,7 @@ class FECode(CardFormat):
         best = min(candidates, key=lambda judged: judged.rank)
         rivals = [judged for judged in candidates if judged is not best]
         if settings.law is not None and not best.is_near.all():
-            rivals = [self._projected(draws, other, fibres) for other in families if other != best.projection]
+            rivals = [self._projected(draws, family, fibres) for family in families if family != best.projection]
         return best, rivals
 
     def _families(self, fibres: Law | None) -> Sequence[Projection]:
@@ -237,11 +237,11 @@ class FECode(CardFormat):
 
     def _projected(self, draws: DrawStresses, projection: Projection, fibres: Law | None) -> JudgedLaw:
         law = projection.law(draws)
-        whole = law if fibres is None else law.plus(fibres)
-        form = self.form_of(whole.material)
+        complete = law if fibres is None else law.plus(fibres)
+        form = self.form_of(complete.material)
         if form is None:
             raise InputError(f"{self.name} has no form for {law.material.name}; ask for another order.")
-        return JudgedLaw.of_projection(draws, projection, law, whole, form)
+        return JudgedLaw.of_projection(draws, projection, law, complete, form)
 
     def _requested(self, settings: CardSettings, families: Sequence[Projection]) -> Sequence[Projection]:
         """Return the projections among which that of the cards is chosen."""

@@ -82,9 +82,9 @@ def _orthonormal(columns: FloatArray, wanted: FloatArray) -> tuple[FloatArray, F
     """Return a basis (k, r) whose columns have orthonormal images, and the coordinates (r,) of what is wanted."""
     size = np.abs(columns).max(axis=0, initial=0.0)
     size[size == 0] = 1.0
-    left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
+    left_vectors, singular, right_vectors = np.linalg.svd(columns / size, full_matrices=False)
     used = singular > MIN_SINGULAR_VALUE * singular.max(initial=0.0)
-    return right[used].T / singular[used] / size[:, None], left[:, used].T @ wanted
+    return right_vectors[used].T / singular[used] / size[:, None], left_vectors[:, used].T @ wanted
 
 
 def fit_within(

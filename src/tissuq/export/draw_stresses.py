@@ -60,8 +60,8 @@ class DrawStresses:
     @cached_property
     def states(self) -> PrincipalStates:
         """The states that were measured, and those around them up to the last of `REACHES`."""
-        most, beyond = self.ensemble.most, pairwise(REACHES)
-        shells = [SeenStates(most), *(states_between(most, factors) for factors in beyond)]
+        limits, factor_pairs = self.ensemble.most, pairwise(REACHES)
+        shells = [SeenStates(limits), *(states_between(limits, factors) for factors in factor_pairs)]
         return PrincipalStates(np.concatenate([shell.logs for shell in shells]))
 
     @cached_property

@@ -230,9 +230,9 @@ FEBIO_OGDEN = OgdenForm(
 def _febio_fibres(*, has_matrix: bool) -> tuple[FibreForm, FibreForm]:
     """Return two families of fibres, and one as two at no angle, with a neo-Hookean matrix or without."""
     name, formula = "Holzapfel-Gasser-Ogden", f"c/2 (I1 - 3) + {DISPERSED}" if has_matrix else DISPERSED
-    both = FibreForm(name, formula, 2, matrix=("c", 2.0), has_matrix=has_matrix)
+    two_families = FibreForm(name, formula, 2, matrix=("c", 2.0), has_matrix=has_matrix)
     halved = f"{formula}, two families at no angle, each with half of k1"
-    return both, replace(both, formula=halved, families=1, only_along_axis=True, share=0.5)
+    return two_families, replace(two_families, formula=halved, families=1, only_along_axis=True, share=0.5)
 
 
 def _febio_mixture(*fibres: FibreForm) -> MixtureForm:

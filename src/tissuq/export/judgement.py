@@ -55,10 +55,12 @@ class JudgedLaw:
         return cls(law, form, None, errors, *_stable(law, ensemble))
 
     @classmethod
-    def of_projection(cls, draws: DrawStresses, projection: Projection, law: Law, whole: Law, form: Form) -> JudgedLaw:
+    def of_projection(
+        cls, draws: DrawStresses, projection: Projection, law: Law, complete: Law, form: Form
+    ) -> JudgedLaw:
         """Return the judgement of a projection in the place of draws, and as a whole with fibres beside it."""
         errors = draws.errors(law.ensemble(draws.ensemble))
-        return cls(whole, form, projection, errors, *_stable(whole, draws.ensemble))
+        return cls(complete, form, projection, errors, *_stable(complete, draws.ensemble))
 
     @property
     def is_near(self) -> NDArray[np.bool_]:

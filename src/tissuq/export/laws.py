@@ -115,18 +115,18 @@ def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[M
 
 def matrix_and_fibres(ensemble: Ensemble) -> tuple[Ensemble, Law | None]:
     """Return draws without their fibres, discrepancy included, and the sum of these, if there are any."""
-    parts = list(parts_of(ensemble))
-    matrix = [part for part in parts if part[0].is_isotropic]
+    terms = list(parts_of(ensemble))
+    matrix = [term for term in terms if term[0].is_isotropic]
     draws = (
         replace(draw, parts=tuple((material, tuple(values[row])) for material, values in matrix))
         for row, draw in enumerate(ensemble)
     )
-    return replace(ensemble, draws=tuple(draws)), fibres_among(parts)
+    return replace(ensemble, draws=tuple(draws)), fibres_among(terms)
 
 
-def fibres_among(parts: list[tuple[Material, FloatArray]]) -> Law | None:
+def fibres_among(terms: list[tuple[Material, FloatArray]]) -> Law | None:
     """Return the sum of the fibres among materials with values (N, k), if there are any."""
-    fibres = [Law(*part) for part in parts if not part[0].is_isotropic]
+    fibres = [Law(*term) for term in terms if not term[0].is_isotropic]
     return reduce(Law.plus, fibres) if fibres else None
 
 

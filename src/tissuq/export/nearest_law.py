@@ -65,14 +65,14 @@ class NearestLaw:
 
     def values(self) -> FloatArray:
         """Return the parameters (k,) with the heaviest weight of what was not measured that costs little inside."""
-        found = [self._weighted(weight) for weight in WEIGHTS_BEYOND]
-        errors = [np.abs(self.columns @ values - self.stress)[~self.is_beyond] for values in found]
+        candidates = [self._weighted(weight) for weight in WEIGHTS_BEYOND]
+        errors = [np.abs(self.columns @ values - self.stress)[~self.is_beyond] for values in candidates]
         rms = [float(np.sqrt((error**2).mean())) for error in errors]
         is_good = [
             error.max() <= WANTED_ERROR or size <= MAX_RMS_RATIO * min(rms)
             for error, size in zip(errors, rms, strict=True)
         ]
-        return found[is_good.index(True)]
+        return candidates[is_good.index(True)]
 
     def _weighted(self, weight_beyond: float) -> FloatArray:
         weights = np.where(self.is_beyond, weight_beyond, 1.0)
@@ -102,6 +102,6 @@ def squared_distance(candidate: Candidate, weights: FloatArray, wanted: FloatArr
     """Return the squared distance, by weights (n,), of stresses (n, N) from the nearest that have these moduli (N,)."""
     start, free = _of_modulus(candidate.unit_moduli, modulus)
     columns = weights[:, None] * (candidate.columns @ free)
-    apart = weights[:, None] * (wanted - candidate.columns @ start)
+    residual = weights[:, None] * (wanted - candidate.columns @ start)
     basis = np.linalg.qr(columns / np.maximum(np.abs(columns).max(axis=0, initial=0.0), 1e-300))[0]
-    return float((apart**2).sum() - ((basis.T @ apart) ** 2).sum())
+    return float((residual**2).sum() - ((basis.T @ residual) ** 2).sum())

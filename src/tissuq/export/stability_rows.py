@@ -66,7 +66,7 @@ def least_eigenvalues(hessian: FloatArray) -> FloatArray:
 
 
 def wanted_stiffness(
-    states: StabilityStates, is_beyond: NDArray[np.bool_], least: FloatArray, modulus: float
+    states: StabilityStates, is_beyond: NDArray[np.bool_], least_stiffness: FloatArray, modulus: float
 ) -> FloatArray:
     """Return the smallest stiffness (n,) that a law may have in states, where a draw has the least one (n,), MPa.
 
@@ -74,7 +74,7 @@ def wanted_stiffness(
     law may be as soft as twice the draw is: draws are known to be stable in these modes alone.
     """
     share = 2 * MIN_TANGENT * modulus
-    half = np.where(least > 0, 0.5, 2.0) * least
+    half = np.where(least_stiffness > 0, 0.5, 2.0) * least_stiffness
     return np.where(is_beyond & states.is_along_mode, share, np.minimum(share, half))
 
 

@@ -116,9 +116,9 @@ class NextTest:
         ratio, count = np.mean(ratios, axis=0), len(ratios)
         spread = np.std(np.sqrt(ratios), axis=0, ddof=1) / np.sqrt(count) if count > 1 else np.zeros(len(ratio))
         weights = self._batches[0].weights
-        now = float(weights.sum() ** 2 / (weights @ weights))
-        least = min(MIN_EFFECTIVE_COMPONENTS, MIN_EFFECTIVE_SHARE * now)
-        is_rough = count > 1 and float(np.mean(effective)) < least
+        effective_now = float(weights.sum() ** 2 / (weights @ weights))
+        min_effective = min(MIN_EFFECTIVE_COMPONENTS, MIN_EFFECTIVE_SHARE * effective_now)
+        is_rough = count > 1 and float(np.mean(effective)) < min_effective
         return Expected(self.sd_now, self.sd_now * np.sqrt(ratio), spread, is_rough)
 
     @cached_property

@@ -108,16 +108,16 @@ def quantity_target(text: str, words: str, states: States, stresses: FloatArray,
             f"least {MIN_DRAWS} draws are needed that differ. Make an ensemble of more (tissuq ensemble --draws)."
         )
     count, centre = len(values), values.mean()
-    left, singular, right = np.linalg.svd(stresses - stresses.mean(axis=0), full_matrices=False)
+    left_vectors, singular, right_vectors = np.linalg.svd(stresses - stresses.mean(axis=0), full_matrices=False)
     rank = min(int((singular > 1e-10 * singular[0]).sum()), count // DRAWS_PER_COMPONENT)
-    scores = left[:, :rank].T @ (values - centre)
+    scores = left_vectors[:, :rank].T @ (values - centre)
     errors = []
     for used in range(1, rank + 1):
-        leverage = 1 / count + (left[:, :used] ** 2).sum(axis=1)
-        residual = values - centre - left[:, :used] @ scores[:used]
+        leverage = 1 / count + (left_vectors[:, :used] ** 2).sum(axis=1)
+        residual = values - centre - left_vectors[:, :used] @ scores[:used]
         errors.append(float(np.mean((residual / (1 - leverage)) ** 2)))
     used = int(np.argmin(errors)) + 1
-    weights = right[:used].T @ (scores[:used] / singular[:used])
+    weights = right_vectors[:used].T @ (scores[:used] / singular[:used])
     intercept, error = float(centre - stresses.mean(axis=0) @ weights), errors[used - 1]
     explained = max(0.0, 1 - error / float(values.var()))
     return QuantityTarget(text, words, states, weights, intercept, float(np.sqrt(error)), explained)

@@ -114,10 +114,10 @@ def rank_tests(
 def _with_ties(table: pd.DataFrame) -> pd.DataFrame:
     """Return a ranking, best first, in which new tests that are not told apart from the best of a target say so."""
     table.insert(list(table.columns).index("is_repeat"), "is_tied", False)
-    for _, own in table[~table["is_repeat"]].groupby("target"):
-        best = own.iloc[0]
-        margin = np.maximum(TOLD_APART * np.hypot(own["error"], best["error"]), SHOWN)
-        tied = own.index[(best["reduction"] - own["reduction"] <= margin) & (own.index != best.name)]
+    for _, new_tests in table[~table["is_repeat"]].groupby("target"):
+        best = new_tests.iloc[0]
+        margin = np.maximum(TOLD_APART * np.hypot(new_tests["error"], best["error"]), SHOWN)
+        tied = new_tests.index[(best["reduction"] - new_tests["reduction"] <= margin) & (new_tests.index != best.name)]
         if len(tied):
             table.loc[[best.name, *tied], "is_tied"] = True
             table.loc[tied, "note"] = [f"{TIED}; {note}" if note else TIED for note in table.loc[tied, "note"]]

@@ -177,8 +177,8 @@ class Covariates:
         """
         names = [covariate.name for covariate in self.each]
         if unknown := [name for name in values if name not in names]:
-            there = f"the covariates are {', '.join(names)}" if names else "it was fitted without covariates"
-            raise InputError(f"there is no covariate {_listed(unknown)} in this population: {there}.")
+            available = f"the covariates are {', '.join(names)}" if names else "it was fitted without covariates"
+            raise InputError(f"there is no covariate {_listed(unknown)} in this population: {available}.")
         pieces = [
             covariate.encoded(values[covariate.name]) if covariate.name in values else np.zeros(len(covariate.effects))
             for covariate in self.each
@@ -194,16 +194,16 @@ class Covariates:
         return [text for c in self.each if c.name in values and (text := c.beyond(values[c.name]))]
 
 
-def covariates_of(given: Any, specimens: Sequence[str], place: Place | None = None) -> Covariates:
+def covariates_of(source: Any, specimens: Sequence[str], locate: Place | None = None) -> Covariates:
     """Return the covariates of specimens.
 
     Parameters
     ----------
-    given : pandas.DataFrame, mapping of str to mapping, or Covariates
+    source : pandas.DataFrame, mapping of str to mapping, or Covariates
         Values by the names of covariates, for every specimen (the index of a table). Numbers may be texts. A name may
         end in a unit in brackets, such as ``age [year]``. None: no covariates.
     specimens : sequence of str
-    place : callable, optional
+    locate : callable, optional
         Where values stand, for messages.
 
     Raises
@@ -212,56 +212,57 @@ def covariates_of(given: Any, specimens: Sequence[str], place: Place | None = No
         When specimens or values are missing or unknown, or a column is constant, or determined by others, or they are
         too many.
     """
-    if isinstance(given, Covariates):
-        return given
-    if given is None:
+    if isinstance(source, Covariates):
+        return source
+    if source is None:
         return Covariates((), np.zeros((len(specimens), 0)))
-    place, values = place or _in_python, _by_specimen(given)
+    locate, values = locate or _in_python, _by_specimen(source)
     if unknown := [name for name in values if name not in specimens]:
         raise InputError(
-            f"{place(unknown[0], '')}: there is no specimen {_listed(unknown)}; the specimens are {_listed(specimens)}."
+            f"{locate(unknown[0], '')}: there is no specimen {_listed(unknown)}; the specimens are "
+            f"{_listed(specimens)}."
         )
     if missing := [name for name in specimens if name not in values]:
         raise InputError(
-            f"{place('', '')}: the covariates of specimen {_listed(missing)} are missing. Add a row, or leave out the "
+            f"{locate('', '')}: the covariates of specimen {_listed(missing)} are missing. Add a row, or leave out the "
             "specimen's tests."
         )
     names = list(dict.fromkeys(str(name) for row in values.values() for name in row))
     if not names:
-        raise InputError(f"{place('', '')}: there is no covariate.")
-    found = [_covariate(name, {s: values[s].get(name) for s in specimens}, place) for name in names]
+        raise InputError(f"{locate('', '')}: there is no covariate.")
+    covariates = [_covariate(name, {s: values[s].get(name) for s in specimens}, locate) for name in names]
     design = np.hstack([np.array([c.encoded(values[s][n]) for s in specimens])
-                        for n, c in zip(names, found, strict=True)])  # fmt: skip
-    if len({covariate.name for covariate in found}) < len(found):
-        raise InputError(f"{place('', '')}: two covariates have the same name; they are {', '.join(names)}.")
+                        for n, c in zip(names, covariates, strict=True)])  # fmt: skip
+    if len({covariate.name for covariate in covariates}) < len(covariates):
+        raise InputError(f"{locate('', '')}: two covariates have the same name; they are {', '.join(names)}.")
     allowed = len(specimens) - SPECIMENS_BEYOND_COLUMNS
     if design.shape[1] > allowed:
         raise InputError(
-            f"{place('', '')}: the covariates ({', '.join(names)}) have {design.shape[1]} effects on every parameter, "
+            f"{locate('', '')}: the covariates ({', '.join(names)}) have {design.shape[1]} effects on every parameter, "
             f"and {len(specimens)} specimens allow {allowed}: leave some out, or join levels."
         )
-    _check_independent(design, [n for n, c in zip(names, found, strict=True) for _ in c.effects], place)
-    return Covariates(tuple(found), design)
+    _check_independent(design, [n for n, c in zip(names, covariates, strict=True) for _ in c.effects], locate)
+    return Covariates(tuple(covariates), design)
 
 
-def _covariate(name: str, values: Mapping[str, Any], place: Place) -> Covariate:
+def _covariate(name: str, values: Mapping[str, Any], locate: Place) -> Covariate:
     """Return the covariate of some values, by specimens."""
     for specimen, value in values.items():
         if value is None or str(value).strip().lower() in ("", "nan", "<na>", "none"):
             raise InputError(
-                f"{place(specimen, name)}: the value of '{name}' is missing. Fill it in, or leave out the specimen and "
-                "its tests, or the column."
+                f"{locate(specimen, name)}: the value of '{name}' is missing. Fill it in, or leave out the specimen "
+                "and its tests, or the column."
             )
     numbers = {specimen: _number(value) for specimen, value in values.items()}
     are_numbers = [number is not None for number in numbers.values()]
     if any(are_numbers) and not all(are_numbers):
         specimen = next(s for s, number in numbers.items() if number is None)
-        raise InputError(f"{place(specimen, name)}: '{values[specimen]}' is no number, as others in this column are.")
+        raise InputError(f"{locate(specimen, name)}: '{values[specimen]}' is no number, as others in this column are.")
     match = UNIT.fullmatch(name)
     if all(are_numbers):
         array = np.array([number for number in numbers.values() if number is not None])
         if array.min() == array.max():
-            raise InputError(f"{place('', name)}: all specimens have the same value, {array[0]:g}: leave it out.")
+            raise InputError(f"{locate('', name)}: all specimens have the same value, {array[0]:g}: leave it out.")
         short, unit = match.groups() if match else (name, "")
         return NumberCovariate(
             short, unit, float(array.mean()), float(array.std()), float(array.min()), float(array.max())
@@ -269,44 +270,46 @@ def _covariate(name: str, values: Mapping[str, Any], place: Place) -> Covariate:
     words = [str(value).strip() for value in values.values()]
     levels = sorted(set(words), key=lambda word: (-words.count(word), word))
     if len(levels) == 1:
-        raise InputError(f"{place('', name)}: all specimens have the same value, '{levels[0]}': leave it out.")
+        raise InputError(f"{locate('', name)}: all specimens have the same value, '{levels[0]}': leave it out.")
     alike = {level.casefold(): level for level in reversed(levels)}
     if different := [level for level in levels if alike[level.casefold()] != level]:
-        first, other = alike[different[0].casefold()], different[0]
-        specimen = next(specimen for specimen, value in values.items() if str(value).strip() == other)
-        raise InputError(f"{place(specimen, name)}: '{other}' and '{first}' differ in capitals only: write them alike.")
+        common, variant = alike[different[0].casefold()], different[0]
+        specimen = next(specimen for specimen, value in values.items() if str(value).strip() == variant)
+        raise InputError(
+            f"{locate(specimen, name)}: '{variant}' and '{common}' differ in capitals only: write them alike."
+        )
     return LevelCovariate(name, tuple(levels))
 
 
-def _check_independent(design: FloatArray, of_columns: Sequence[str], place: Place) -> None:
+def _check_independent(design: FloatArray, of_columns: Sequence[str], locate: Place) -> None:
     """Refuse a column that those before it determine, together with a constant."""
-    known = np.ones((len(design), 1)) / np.sqrt(len(design))
+    basis = np.ones((len(design), 1)) / np.sqrt(len(design))
     for name, column in zip(of_columns, design.T, strict=True):
-        before = list(dict.fromkeys(of_columns[: known.shape[1] - 1]))
-        left = column - known @ (known.T @ column)
-        left -= known @ (known.T @ left)
-        if np.linalg.norm(left) < DEPENDENT * np.linalg.norm(column):
+        earlier = list(dict.fromkeys(of_columns[: basis.shape[1] - 1]))
+        residual = column - basis @ (basis.T @ column)
+        residual -= basis @ (basis.T @ residual)
+        if np.linalg.norm(residual) < DEPENDENT * np.linalg.norm(column):
             raise InputError(
-                f"{place('', name)}: the covariates before it ({_listed(before)}) determine it in these specimens, so "
-                "that their effects cannot be told apart: leave one of them out."
+                f"{locate('', name)}: the covariates before it ({_listed(earlier)}) determine it in these specimens, "
+                "so that their effects cannot be told apart: leave one of them out."
             )
-        known = np.column_stack([known, left / np.linalg.norm(left)])
+        basis = np.column_stack([basis, residual / np.linalg.norm(residual)])
 
 
-def _by_specimen(given: Any) -> dict[str, Mapping[str, Any]]:
+def _by_specimen(table: Any) -> dict[str, Mapping[str, Any]]:
     """Return values by specimen, of a table or of a mapping."""
-    if hasattr(given, "iterrows"):
-        labels = [str(label) for label in given.index]
+    if hasattr(table, "iterrows"):
+        labels = [str(label) for label in table.index]
         if twice := [label for label in dict.fromkeys(labels) if labels.count(label) > 1]:
             raise InputError(f"covariates: specimen {_listed(twice)} has several rows; give one for each specimen.")
-        columns = {str(name): list(given[name]) for name in given.columns}
+        columns = {str(name): list(table[name]) for name in table.columns}
         return {label: {name: cells[row] for name, cells in columns.items()} for row, label in enumerate(labels)}
-    if not isinstance(given, Mapping) or not all(isinstance(row, Mapping) for row in given.values()):
+    if not isinstance(table, Mapping) or not all(isinstance(row, Mapping) for row in table.values()):
         raise InputError(
             "covariates must be a table with a row for each specimen (its index), or a mapping such as "
-            f"{{'S1': {{'age': 60, 'sex': 'f'}}}}, not {type(given).__name__}."
+            f"{{'S1': {{'age': 60, 'sex': 'f'}}}}, not {type(table).__name__}."
         )
-    return {str(specimen): {str(name): value for name, value in row.items()} for specimen, row in given.items()}
+    return {str(specimen): {str(name): value for name, value in row.items()} for specimen, row in table.items()}
 
 
 def _number(value: Any) -> float | None:

@@ -167,8 +167,8 @@ def _corrected(sampled: NutsDraws, coarse: Any, fine: Any, design: Any, seed: in
     """Return draws resampled by the likelihood of the many Gaussians, over that of the few that were sampled from."""
     points = jnp.asarray(sampled.values.reshape(-1, len(sampled.names)))
     keys = jax.random.split(jax.random.key(seed), len(points))
-    found = _corrected_draws(points, keys, coarse, fine, design)
-    mean, root, specimens, gain = (np.asarray(array) for array in found)
+    resampled = _corrected_draws(points, keys, coarse, fine, design)
+    mean, root, specimens, gain = (np.asarray(array) for array in resampled)
     weights = np.exp(gain - gain.max())
     shape = sampled.values.shape[:2]
     rows = systematic(weights.reshape(shape), DRAWS_PER_CHAIN) + DRAWS_PER_CHAIN * np.arange(shape[0])[:, None]

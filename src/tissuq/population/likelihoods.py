@@ -133,7 +133,7 @@ class Likelihoods:
 def mixtures_of(posteriors: Sequence[Posterior], coordinates: Coordinates) -> tuple[list[GaussianMixture], FloatArray]:
     """Return every specimen's posterior on the line with a reference for its prior, and the reference's sd (d,)."""
     solutions = [posterior.solution for posterior in posteriors]
-    mixtures = [_with_common_error(on_line(each, coordinates), each, coordinates) for each in solutions]
+    mixtures = [_with_common_error(on_line(solution, coordinates), solution, coordinates) for solution in solutions]
     between = np.std([mixture.moments()[0] for mixture in mixtures], axis=0)
     reference = np.hypot(MIN_REFERENCE_SD, REFERENCE_SD_RATIO * between)
     return [_under(reference, *mixture, coordinates) for mixture in zip(mixtures, posteriors, strict=True)], reference

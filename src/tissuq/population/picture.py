@@ -72,13 +72,13 @@ def numbers_of(table: pd.DataFrame) -> dict[Any, dict[str, float]]:
     return {index: {str(name): float(value) for name, value in row.items()} for index, row in table.T.to_dict().items()}
 
 
-def _limits(estimates: Mapping[str, FloatArray], others: list[float]) -> tuple[float, float]:
+def _limits(estimates: Mapping[str, FloatArray], new: list[float]) -> tuple[float, float]:
     """Return the ends of an axis for the specimens that are not far from the rest; others may run out."""
-    first, last = np.quantile(estimates["median"], [0.25, 0.75])
-    reach = FENCE * (last - first)
-    near = (estimates["median"] >= first - reach) & (estimates["median"] <= last + reach)
+    lower, upper = np.quantile(estimates["median"], [0.25, 0.75])
+    reach = FENCE * (upper - lower)
+    near = (estimates["median"] >= lower - reach) & (estimates["median"] <= upper + reach)
     ends = [estimates[f"{prefix}{end}"][near] for prefix in ("", "alone_") for end in ENDS]
-    return limits_of([estimates["median"][near]], [*ends, others], margin=1.0)
+    return limits_of([estimates["median"][near]], [*ends, new], margin=1.0)
 
 
 def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float]) -> None:
@@ -88,13 +88,15 @@ def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: l
     words: dict[str, Any] = looks | {"fontsize": "small", "va": "center"}
     for level, (median, start, end) in enumerate(zip(*(estimates[name] for name in ("median", *ENDS)), strict=True)):
         if not low <= median <= high:
-            mark, side, place, inward = (">", "right", 0.985, -0.025) if median > high else ("<", "left", 0.015, 0.025)
-            axis.plot([place], [level], mark, ms=4 * relative_size(), **looks)
-            axis.text(place + inward, level, f"{median:.2g} [{start:.2g}, {end:.2g}]", ha=side, **words)
-    beyond = [f"{word} {end:.2g}" for word, end, is_beyond in zip(
+            mark, side, position, inward = (
+                (">", "right", 0.985, -0.025) if median > high else ("<", "left", 0.015, 0.025)
+            )
+            axis.plot([position], [level], mark, ms=4 * relative_size(), **looks)
+            axis.text(position + inward, level, f"{median:.2g} [{start:.2g}, {end:.2g}]", ha=side, **words)
+    cut_ends = [f"{word} {end:.2g}" for word, end, is_beyond in zip(
         ("from", "to"), new, (new[0] < low, new[1] > high), strict=True) if is_beyond]  # fmt: skip
-    if beyond:
-        axis.text(0.985, -0.55, f"a new specimen: {' '.join(beyond)}", ha="right", **words)
+    if cut_ends:
+        axis.text(0.985, -0.55, f"a new specimen: {' '.join(cut_ends)}", ha="right", **words)
 
 
 def _draw_specimens(axis: Axes, estimates: Mapping[str, FloatArray], small: bool) -> None:

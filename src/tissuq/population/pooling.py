@@ -133,7 +133,7 @@ def fit_population(
             "leave out that it is shared."
         )
     _check_deformed(specimens)
-    known = covariates_of(covariates, list(specimens))
+    encoded = covariates_of(covariates, list(specimens))
     of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
     of_tests = of_tests if isinstance(of_tests, Tolerances) else Tolerances(**of_tests)
     if of_tests.estimand == TISSUE:
@@ -154,20 +154,22 @@ def fit_population(
     fits: dict[str, Posterior] = {}
     for sd in dict.fromkeys(noise_of.values()):
         alike = [name for name in specimens if noise_of[name] == sd]
-        joined = [_one_specimen(name, specimens[name], apart=bool(of_tests) or isinstance(sd, tuple)) for name in alike]
+        joined = [
+            _one_specimen(name, specimens[name], separate=bool(of_tests) or isinstance(sd, tuple)) for name in alike
+        ]
         fits |= zip(alike, fit_many(joined, noise_sd=sd, tolerances=of_tests, **options), strict=True)
     single = [fits[name] for name in specimens]
     of_all = _noise_of_all(noise_of, specimens) if isinstance(noise_sd, Mapping) else noise_sd
-    together = _one_specimen(ALL_SPECIMENS, all_tests, apart=isinstance(of_all, list))
+    together = _one_specimen(ALL_SPECIMENS, all_tests, separate=isinstance(of_all, list))
     (complete,) = fit_many([together], noise_sd=of_all, tolerances=AS_TESTED, **options)
     coordinates = coordinates_of(single, symbols)
     mixtures, reference = mixtures_of(single, coordinates)
-    hierarchy = sample_hierarchy(mixtures, reference, symbols, known, spread, seed)
+    hierarchy = sample_hierarchy(mixtures, reference, symbols, encoded, spread, seed)
     covariance = shared_covariance(single, coordinates) if shared_discrepancy else None
     if covariance is not None:
         hierarchy = biased(hierarchy, covariance, seed)
     by_name = dict(zip(specimens, single, strict=True))
-    return Population(by_name, complete, coordinates, hierarchy, spread, seed, known, shared_covariance=covariance)
+    return Population(by_name, complete, coordinates, hierarchy, spread, seed, encoded, shared_covariance=covariance)
 
 
 def _by_specimen(
@@ -196,13 +198,13 @@ def _check_deformed(specimens: Mapping[str, Sequence[Experiment]]) -> None:
         name: max(float(np.abs(test.stretch - test.mode.reference).max()) for test in tests)
         for name, tests in specimens.items()
     }
-    usual = median(largest.values())
-    small = [name for name, deformation in largest.items() if deformation < LEAST_DEFORMATION * usual]
+    typical = median(largest.values())
+    small = [name for name, deformation in largest.items() if deformation < LEAST_DEFORMATION * typical]
     if small:
-        which = ", ".join(f"{name} (by {largest[name]:.2g} at the most)" for name in small)
+        listed = ", ".join(f"{name} (by {largest[name]:.2g} at the most)" for name in small)
         options = " ".join(f"--without {name}" for name in small)
         raise InputError(
-            f"hardly deformed: {which}, while half of the specimens were by {usual:.2g} or more. Such tests say "
+            f"hardly deformed: {listed}, while half of the specimens were by {typical:.2g} or more. Such tests say "
             "nothing of a stiffness, and would widen the range of all specimens. See whether the column and the unit "
             f"of the stretch are right; or leave out what was not stretched: {options}."
         )
@@ -225,9 +227,9 @@ def _noise_of_all(noise_of: Mapping[str, Any], specimens: Mapping[str, Sequence[
     return "unknown" if "unknown" in of_tests else of_tests
 
 
-def _one_specimen(name: str, tests: Sequence[Experiment], *, apart: bool = False) -> Experiment:
+def _one_specimen(name: str, tests: Sequence[Experiment], *, separate: bool = False) -> Experiment:
     """Return tests as those of one specimen: joined in each mode, unless they are to stay apart."""
-    if apart:
+    if separate:
         return Experiment.of([test.labelled(name=name, specimen=name) for test in tests])
     modes: dict[LoadingMode, list[Experiment]] = {}
     for test in tests:

@@ -53,8 +53,8 @@ class Population(PopulationDraws):
             When there is no such covariate, or no such level of it.
         """
         self.covariates.row(covariates)
-        parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.spread_prior, self.seed
-        return Population(*parts, self.covariates, covariates, self.shared_covariance)
+        fitted = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.spread_prior, self.seed
+        return Population(*fitted, self.covariates, covariates, self.shared_covariance)
 
     @cached_property
     def patient(self) -> Posterior:
@@ -184,8 +184,8 @@ class Population(PopulationDraws):
 
         Columns ``independent`` (specimens' discrepancies are) and ``shared`` (all have the same); equal without one.
         """
-        known = self.shared_covariance
-        covariance = shared_covariance(list(self.posteriors.values()), self.coordinates) if known is None else known
+        stored = self.shared_covariance
+        covariance = shared_covariance(list(self.posteriors.values()), self.coordinates) if stored is None else stored
         return width_table(self, covariance, prob)
 
     def specimens_needed(self, aim: float, prob: float = 0.95, assurance: float = 0.8) -> pd.DataFrame:
@@ -306,8 +306,8 @@ class Population(PopulationDraws):
             "converged": str(self.converged),
         }
         labels |= {"shared_discrepancy": "True"} if self.shared_covariance is not None else {}
-        parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new
-        return labelled(*parts, labels, self.covariates)
+        results = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new
+        return labelled(*results, labels, self.covariates)
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""

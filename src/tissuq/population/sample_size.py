@@ -71,7 +71,7 @@ def needed_table(population: PopulationDraws, aim: float, prob: float, assurance
     count, rows = len(population.names), {}
     sizes = _sizes(count)
     for j, symbol in enumerate(population.symbols):
-        mean, variance = (np.array(each) for each in zip(*((m[j], c[j, j]) for m, c in moments), strict=True))
+        mean, variance = (np.array(moment) for moment in zip(*((m[j], c[j, j]) for m, c in moments), strict=True))
         precision = np.maximum(1 / variance - 1 / reference[j] ** 2, MIN_PRECISION_RATIO / reference[j] ** 2)
         columns = np.column_stack([np.ones(count), population.covariates.design])
         specimens = _Specimens(mean / variance / precision, 1 / np.sqrt(precision), columns)
@@ -82,8 +82,8 @@ def needed_table(population: PopulationDraws, aim: float, prob: float, assurance
         tau = population.hierarchy.tau[..., j].ravel()
         for quantity, of_quantity in zip(("median", "new patient"), widths, strict=True):
             likely = np.quantile(of_quantity, assurance, axis=0)
-            own = score(prob) * tau * (quantity == "new patient")
-            floor = float(np.quantile(relative_width(population, j, np.hypot(own, shared)), assurance))
+            scatter = score(prob) * tau * (quantity == "new patient")
+            floor = float(np.quantile(relative_width(population, j, np.hypot(scatter, shared)), assurance))
             needed = _first_below(aim, sizes, likely) if floor < aim else np.nan
             rows[symbol, quantity] = [likely[0], floor, needed, needed - count]
     index = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
@@ -109,22 +109,22 @@ def _half_widths(
                      population.covariates.row(population.patient_covariates)])  # fmt: skip
     row = np.column_stack([np.ones(2), rows])
     tau = hierarchy.tau[..., j].ravel()
-    chosen = generator.choice(len(tau), FUTURES, replace=False)
+    futures = generator.choice(len(tau), FUTURES, replace=False)
     effects = hierarchy.effects[..., j].reshape(len(tau), -1)
-    slopes = np.column_stack([hierarchy.sampled.values[..., j].ravel(), effects])[chosen]
-    known = specimens.sums(spreads)
-    found = []
-    for slope, own_tau in zip(slopes, tau[chosen], strict=True):
+    slopes = np.column_stack([hierarchy.sampled.values[..., j].ravel(), effects])[futures]
+    measured_sums = specimens.sums(spreads)
+    widths = []
+    for slope, own_tau in zip(slopes, tau[futures], strict=True):
         likewise = generator.integers(count, size=int(sizes[-1]) - count)
         columns, w = specimens.columns[likewise], specimens.w[likewise]
         y = columns @ slope + np.hypot(own_tau, w) * generator.standard_normal(len(w))
-        sums, of_sizes = known, []
+        sums, of_sizes = measured_sums, []
         for start, stop in zip(np.r_[count, sizes[:-1]] - count, sizes - count, strict=True):
-            part = slice(start, stop)
-            sums = sums + _Specimens(y[part], w[part], columns[part]).sums(spreads)
+            batch = slice(start, stop)
+            sums = sums + _Specimens(y[batch], w[batch], columns[batch]).sums(spreads)
             of_sizes.append(sums)
-        found.append(_known_then(np.array(of_sizes), spreads, log_prior, row, prob))
-    return np.stack(found, axis=1)
+        widths.append(_known_then(np.array(of_sizes), spreads, log_prior, row, prob))
+    return np.stack(widths, axis=1)
 
 
 def _known_then(
@@ -164,8 +164,8 @@ def relative_width(population: PopulationDraws, j: int, half_width: FloatArray) 
     """Return half widths on the line over the median of a parameter."""
     if population.coordinates.is_log[j]:
         return np.asarray(np.sinh(half_width))
-    own = population.coordinates.from_line(population.hierarchy.sampled.values[..., : len(population.symbols)])
-    return np.asarray(half_width * population.coordinates.scale[j] / np.abs(np.median(own[..., j])))
+    values = population.coordinates.from_line(population.hierarchy.sampled.values[..., : len(population.symbols)])
+    return np.asarray(half_width * population.coordinates.scale[j] / np.abs(np.median(values[..., j])))
 
 
 def score(prob: float) -> float:
@@ -177,10 +177,10 @@ def score(prob: float) -> float:
 
 def _first_below(aim: float, sizes: Any, widths: FloatArray) -> float:
     """Return the number of specimens from which widths are below the aim; nan where none is."""
-    place = int(np.argmax(widths <= aim))
-    if widths[place] > aim:
+    index = int(np.argmax(widths <= aim))
+    if widths[index] > aim:
         return np.nan
-    if place == 0:
+    if index == 0:
         return float(sizes[0])
-    share = np.log(widths[place - 1] / aim) / np.log(widths[place - 1] / widths[place])
-    return float(np.ceil(sizes[place - 1] * (sizes[place] / sizes[place - 1]) ** share))
+    share = np.log(widths[index - 1] / aim) / np.log(widths[index - 1] / widths[index])
+    return float(np.ceil(sizes[index - 1] * (sizes[index] / sizes[index - 1]) ** share))

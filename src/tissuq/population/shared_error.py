@@ -86,10 +86,10 @@ def _due_to_discrepancy(solution: Solution, coordinates: Coordinates) -> FloatAr
         return np.zeros((len(coordinates.symbols), len(coordinates.symbols)))
     mean, root = values_of(model, solution.mixture, coordinates.symbols)
     of_all = GaussianMixture(solution.mixture.weights, np.zeros((len(mean), 0)), mean, root)
-    total, on_the_line = (_root(each.moments()[1]) for each in (of_all, on_line(solution, coordinates)))
+    total, on_the_line = (_root(mixture.moments()[1]) for mixture in (of_all, on_line(solution, coordinates)))
     inverse = np.linalg.inv(total)
-    given = inverse @ _given_discrepancy(model, solution.mixture, coordinates.symbols) @ inverse.T
-    values, vectors = np.linalg.eigh(np.eye(len(given)) - given)
+    conditional = inverse @ _given_discrepancy(model, solution.mixture, coordinates.symbols) @ inverse.T
+    values, vectors = np.linalg.eigh(np.eye(len(conditional)) - conditional)
     sides = on_the_line @ vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(sides @ sides.T)
 

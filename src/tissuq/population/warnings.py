@@ -40,9 +40,9 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
             f"{len(population.names)} specimens determine the spread poorly{beside}: its prior, half-normal with sd "
             f"{population.spread_prior:g} of the logarithm, influences the interval of a new specimen, too."
         )
-    if beyond := population.covariates.beyond(population.patient_covariates):
+    if extrapolated := population.covariates.beyond(population.patient_covariates):
         sentences.append(
-            f"the new specimen is beyond the specimens: {', '.join(beyond)}. That effects go on so is assumed."
+            f"the new specimen is beyond the specimens: {', '.join(extrapolated)}. That effects go on so is assumed."
         )
     return tuple(sentences)
 

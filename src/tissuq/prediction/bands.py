@@ -87,16 +87,16 @@ class Mixtures:
         if len(self.weights) > 2 * COMPONENTS_OF_SKETCH:
             begin = self._thinned(COMPONENTS_OF_SKETCH).quantile(probability)
         value = quantile = np.clip(begin, low, high)
-        places = np.arange(len(value))
+        indices = np.arange(len(value))
         for _ in range(60):
             scores = (value - mean) / sd
             excess = self.weights @ ndtr(scores) - probability
-            quantile[places] = value
+            quantile[indices] = value
             is_open = np.abs(excess) >= 1e-9
             if not is_open.any():
                 break
             if not is_open.all():
-                places, value, low, high, excess = (a[is_open] for a in (places, value, low, high, excess))
+                indices, value, low, high, excess = (a[is_open] for a in (indices, value, low, high, excess))
                 mean, sd, scores = (a[:, is_open] for a in (mean, sd, scores))
             low, high = np.where(excess < 0, value, low), np.where(excess < 0, high, value)
             with np.errstate(over="ignore"):

@@ -197,9 +197,9 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
         log_weights, is_unsure = _over_noise(solution.model, wide, components, log_weights)
     log_weights = log_weights - np.logaddexp.reduce(log_weights, axis=0)
     effective = components.weights.sum() ** 2 / (components.weights**2).sum()
-    left = 1 / np.exp(2 * log_weights).sum(axis=0)
+    remaining = 1 / np.exp(2 * log_weights).sum(axis=0)
     log_density = np.logaddexp.reduce(log_weights + density, axis=0)
-    return LeaveOneOut(log_density, is_unsure | (left < MIN_EFFECTIVE_SHARE * effective))
+    return LeaveOneOut(log_density, is_unsure | (remaining < MIN_EFFECTIVE_SHARE * effective))
 
 
 def _over_noise(
@@ -214,14 +214,14 @@ def _over_noise(
     shares = np.array([wide.weights[wide.settings[:, column] == value].sum() for value in values])
     if len(values) < 2:
         return log_weights, np.zeros(log_weights.shape[1], dtype=bool)
-    rows = [np.flatnonzero(number == place) for place in range(len(values))]
+    rows = [np.flatnonzero(number == index) for index in range(len(values))]
     of_values = np.array([np.logaddexp.reduce(log_weights[of_value], axis=0) for of_value in rows])
     weights = np.array([components.weights[of_value].sum() for of_value in rows])
     shares /= shares.sum()
-    left = shares_with_factors(np.log(values), shares, of_values - np.log(weights)[:, None])
+    reweighted = shares_with_factors(np.log(values), shares, of_values - np.log(weights)[:, None])
     with np.errstate(divide="ignore"):
-        log_weights = log_weights + (np.log(left) - of_values)[number]
-    return log_weights, (left - shares[:, None])[[0, -1]].max(axis=0) > MAX_GAIN_AT_END
+        log_weights = log_weights + (np.log(reweighted) - of_values)[number]
+    return log_weights, (reweighted - shares[:, None])[[0, -1]].max(axis=0) > MAX_GAIN_AT_END
 
 
 def left_out_log_density(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
