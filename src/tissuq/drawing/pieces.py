@@ -88,9 +88,9 @@ def points(
     if len(x) > MAX_POINTS:
         edges = np.linspace(x.min(), x.max(), BINS + 1)
         order = np.argsort(x)
-        bins = [places for places in np.split(order, np.searchsorted(x[order], edges[1:-1])) if len(places)]
-        centre, mean = (np.array([values[places].mean() for places in bins]) for values in (x, y))
-        low, high = np.array([np.quantile(y[places], [0.025, 0.975]) for places in bins]).T
+        bins = [indices for indices in np.split(order, np.searchsorted(x[order], edges[1:-1])) if len(indices)]
+        centre, mean = (np.array([values[indices].mean() for indices in bins]) for values in (x, y))
+        low, high = np.array([np.quantile(y[indices], [0.025, 0.975]) for indices in bins]).T
         axis.vlines(centre, low, high, color=INK, lw=0.8 * size)
         label = f"{label} ({len(y)}, in bins)" if label else ""
         axis.plot(centre, mean, "o", color=INK, ms=2.5 * size, label=label)
@@ -182,9 +182,9 @@ def cut_off(axis: Axes, low: ArrayLike, high: ArrayLike, unit: str) -> None:
     """Say in a corner how far bands go beyond the limits of the vertical axis, where they do."""
     start, end = axis.get_ylim()
     ends = float(np.nanmin(low)), float(np.nanmax(high))
-    beyond = [value for value, is_beyond in zip(ends, (ends[0] < start, ends[1] > end), strict=True) if is_beyond]
-    if beyond:
-        size = max(map(abs, beyond))
-        numbers = " and ".join(f"{value:.2g}" if size < 1e6 else f"{value:.0e}" for value in beyond)
+    cut_ends = [value for value, is_beyond in zip(ends, (ends[0] < start, ends[1] > end), strict=True) if is_beyond]
+    if cut_ends:
+        size = max(map(abs, cut_ends))
+        numbers = " and ".join(f"{value:.2g}" if size < 1e6 else f"{value:.0e}" for value in cut_ends)
         axis.text(0.02, 0.98, f"bands go on to {numbers} {unit}", transform=axis.transAxes, va="top",
                   fontsize="small", color=INK)  # fmt: skip

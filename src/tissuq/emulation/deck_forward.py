@@ -148,12 +148,12 @@ class DeckForward(Forward):
         extra = extra_files(deck, self.also, Path())
         contents = [(name, sha256(text).hexdigest()) for name, text in sorted(deck.files.items())]
         contents += [(name, sha256(file.read_bytes()).hexdigest()) for name, file in sorted(extra.items())]
-        asked = [quantity.identity for quantity in self.quantities], self.factor, self.along_factor
+        outputs = [quantity.identity for quantity in self.quantities], self.factor, self.along_factor
         of_card = self.material, self.stretch, self.mode, self.card_format, self.cards
         everything = (
             contents,
             self.replaced.upper(),
-            asked,
+            outputs,
             of_card,
             self.program.name,
             self.program.words("job", "deck"),
@@ -189,8 +189,8 @@ class DeckForward(Forward):
 
     def of_quantities(self, ends: Mapping[str, tuple[int, int]]) -> Forward:
         if set(ends) != set(self.measured):
-            asked, given = (", ".join(filter(None, names)) or "one quantity" for names in (self.measured, ends))
-            raise InputError(f"the model gives {asked}; what was measured is {given}.")
+            modelled, measured = (", ".join(filter(None, names)) or "one quantity" for names in (self.measured, ends))
+            raise InputError(f"the model gives {modelled}; what was measured is {measured}.")
         return super().of_quantities(ends)
 
     def run(self, parameters: Mapping[str, float], control: FloatArray | Mapping[str, FloatArray]) -> Any:
@@ -206,12 +206,14 @@ class DeckForward(Forward):
             raise UnreadableError(result["misread"])
         if not isinstance(control, Mapping):
             return self._at(control, "", result["curves"], str(result["problem"]))
-        return {name: self._at(at, name, result["curves"], str(result["problem"])) for name, at in control.items()}
+        return {
+            name: self._at(values, name, result["curves"], str(result["problem"])) for name, values in control.items()
+        }
 
     def clear(self, parameters: Mapping[str, float]) -> None:
-        place = self._place(parameters)
-        if not (self.keep or problem_of(place)):
-            shutil.rmtree(place, ignore_errors=True)
+        folder = self._place(parameters)
+        if not (self.keep or problem_of(folder)):
+            shutil.rmtree(folder, ignore_errors=True)
 
     def _place(self, parameters: Mapping[str, float]) -> Path:
         """Return the folder of a run."""

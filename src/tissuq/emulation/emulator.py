@@ -154,17 +154,17 @@ class Emulator:
         size = len(self.symbols)
         cube = qmc.Sobol(2 * size, rng=np.random.default_rng(61)).random(SENSITIVITY_POINTS)
         quantiles = [priors[symbol].quantile for symbol in self.symbols]
-        one, other = (
+        base_points, new_points = (
             np.column_stack([quantile(column) for quantile, column in zip(quantiles, half.T, strict=True)])
             for half in (cube[:, :size], cube[:, size:])
         )
-        base, new = self._means(one) / self.basis.scale, self._means(other) / self.basis.scale
+        base, new = self._means(base_points) / self.basis.scale, self._means(new_points) / self.basis.scale
         variance = np.concatenate([base, new]).var(axis=0).sum()
         rows = []
         for k in range(size):
-            mixed = self._means(np.where(np.arange(size) == k, other, one)) / self.basis.scale
-            first = (new * (mixed - base)).mean(axis=0).sum()
-            rows.append((first / variance, 0.5 * ((mixed - base) ** 2).mean(axis=0).sum() / variance))
+            mixed = self._means(np.where(np.arange(size) == k, new_points, base_points)) / self.basis.scale
+            first_order = (new * (mixed - base)).mean(axis=0).sum()
+            rows.append((first_order / variance, 0.5 * ((mixed - base) ** 2).mean(axis=0).sum() / variance))
         return pd.DataFrame(rows, pd.Index(self.symbols, name="parameter"), ["first", "total"])
 
     def _means(self, values: FloatArray) -> FloatArray:

@@ -195,9 +195,9 @@ class SeveralModels(Forward):
         return " and ".join(model.name for _, model in self.models)
 
     def of_quantities(self, ends: Mapping[str, tuple[int, int]]) -> Forward:
-        given = [name for names, _ in self.models for name in names]
-        if sorted(given) != sorted(ends):
-            raise InputError(f"the models give {', '.join(given)}; what was measured is {', '.join(ends)}.")
+        modelled = [name for names, _ in self.models for name in names]
+        if sorted(modelled) != sorted(ends):
+            raise InputError(f"the models give {', '.join(modelled)}; what was measured is {', '.join(ends)}.")
         for names, model in self.models:
             model.of_quantities({name: ends[name] for name in names} if len(names) > 1 else {"": ends[names[0]]})
         return SeveralQuantities(self, tuple((name, *pair) for name, pair in ends.items()))

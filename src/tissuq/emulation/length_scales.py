@@ -108,7 +108,9 @@ class LengthScales:
         from scipy.linalg import lapack
 
         inverse_squares, nugget = np.exp(-2 * logs[:-1]), float(np.exp(logs[-1]))
-        cov, slope = (part.reshape(self.count, -1) for part in correlation(self.kernel, inverse_squares @ self.squared))
+        cov, slope = (
+            matrix.reshape(self.count, -1) for matrix in correlation(self.kernel, inverse_squares @ self.squared)
+        )
         factor, failed = lapack.dpotrf(cov + nugget * np.eye(self.count), lower=1)
         if failed:
             return -IMPROBABLE, np.zeros_like(logs)
@@ -120,11 +122,11 @@ class LengthScales:
         score = (logs[:-1] - np.log(MEDIAN_LENGTH)) / LOG_LENGTH_SD
         value = -np.log(np.diag(factor)).sum() - np.log(np.abs(np.diag(triangle))).sum()
         value += -0.5 * free * np.log(squares) - 0.5 * float(score @ score)
-        parts, _ = lapack.dtrtrs(
+        solved, _ = lapack.dtrtrs(
             factor, np.column_stack([orthonormal, np.sqrt(free / squares) * residual]), lower=1, trans=1
         )
         lower = lapack.dpotri(factor, lower=1)[0]
-        change = np.tril(lower) + np.tril(lower, -1).T - parts @ parts.T
+        change = np.tril(lower) + np.tril(lower, -1).T - solved @ solved.T
         of_lengths = -0.5 * inverse_squares * (self.squared @ (change * slope).ravel())
         return float(value), np.append(of_lengths - score / LOG_LENGTH_SD, -0.5 * nugget * np.trace(change))
 
@@ -148,8 +150,8 @@ class LengthScales:
         bounds = [tuple(np.log(LENGTH_BOUNDS))] * self.size + [tuple(np.log(NUGGET_BOUNDS))]
         spread = np.log(0.15) + np.log(30.0) * quasi_random(self.size, starts)
         points = [mode.logs for mode in near] + [np.append(point, np.log(START_NUGGET)) for point in spread]
-        found = [minimize(loss, point, jac=True, bounds=bounds, method="L-BFGS-B") for point in points]
-        best = min(found, key=lambda result: float(result.fun))
+        optima = [minimize(loss, point, jac=True, bounds=bounds, method="L-BFGS-B") for point in points]
+        best = min(optima, key=lambda result: float(result.fun))
         return Mode(np.asarray(best.x), -float(best.fun))
 
     def settings(self, values: FloatArray, mode: Mode) -> tuple[FloatArray, FloatArray]:

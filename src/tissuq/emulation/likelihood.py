@@ -113,12 +113,13 @@ def _moments(form: Form, values: Any, data: Mapping[str, Any]) -> tuple[Any, Any
     for name, start, stop in form.quantities:
         control = data["control"][start:stop]
         rounding.append(jnp.full(stop - start, ROUNDING_SHARE * jnp.abs(data["measured"][start:stop]).max()))
-        own = {
+        hyperparameters = {
             parameter.symbol: values_by_symbol[symbol_of(parameter.symbol, name)]
             for parameter in form.discrepancy.parameters
         }
         blocks.append(
-            form.discrepancy.correlated_variance(own) * form.discrepancy.kernel(0, control, control, own)
+            form.discrepancy.correlated_variance(hyperparameters)
+            * form.discrepancy.kernel(0, control, control, hyperparameters)
             if form.discrepancy.is_correlated
             else jnp.zeros((stop - start, stop - start))
         )

@@ -119,7 +119,7 @@ def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float
     experiment = _experiment(law, np.array([values]), loading_mode(mode), stretch)
     noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
     model = StatisticalModel(experiment, law, NoDiscrepancy(), noise)
-    ranges = {each.name: measured_range(experiment, each) for each in curve_modes()}
+    ranges = {loading.name: measured_range(experiment, loading) for loading in curve_modes()}
     return Ensemble((EnergyDraw(0, ((law, values),), None),), model, (), 1, ranges)
 
 

@@ -251,8 +251,8 @@ class ForwardRuns:
         columns = zip(self.symbols, bad.T, strict=True)
         ranges = " and ".join(f"{symbol} from {column.min():.4g} to {column.max():.4g}" for symbol, column in columns)
         inside = int(((good >= bad.min(axis=0)) & (good <= bad.max(axis=0))).all(axis=1).sum())
-        others = f"{inside or 'no'} run{'s' * (inside != 1)} with values in these ranges succeeded"
-        return f"with {ranges}; {others}"
+        successes = f"{inside or 'no'} run{'s' * (inside != 1)} with values in these ranges succeeded"
+        return f"with {ranges}; {successes}"
 
 
 def gathered(symbols: Sequence[str], results: Sequence[Mapping[str, Any]], outputs: int) -> ForwardRuns:

@@ -159,9 +159,11 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
         of_round = [(1.0, searched[number])] if number < len(searched) else _components(scores, logs)
         ends = np.round(np.cumsum([share for share, _ in of_round]) * ROUND_POINTS).astype(int)
         blocks = np.split(uniforms, ends[:-1])
-        new = np.concatenate([part.points(block) for (_, part), block in zip(of_round, blocks, strict=True)])
+        new = np.concatenate([proposal.points(block) for (_, proposal), block in zip(of_round, blocks, strict=True)])
         more = [
-            (len(block) / ROUND_POINTS, part) for (_, part), block in zip(of_round, blocks, strict=True) if len(block)
+            (len(block) / ROUND_POINTS, proposal)
+            for (_, proposal), block in zip(of_round, blocks, strict=True)
+            if len(block)
         ]
         proposals += more
         mixture = np.concatenate([np.logaddexp(mixture, _log_mixture(more, scores)), _log_mixture(proposals, new)])
@@ -174,7 +176,7 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
 
 def _log_mixture(proposals: Sequence[tuple[float, Proposal]], scores: FloatArray) -> FloatArray:
     """Return the logarithm (N,) of the sum of proposals, times their shares, at scores (N, D)."""
-    heights = [np.log(share) + part.log_density(scores) for share, part in proposals]
+    heights = [np.log(share) + proposal.log_density(scores) for share, proposal in proposals]
     return np.asarray(np.logaddexp.reduce(heights, axis=0))
 
 
@@ -204,9 +206,10 @@ def _components(scores: FloatArray, logs: FloatArray) -> list[tuple[float, Propo
         slices = np.argsort(np.argsort(points[:, axis])) * COMPONENTS // FITTED_POINTS
         shares = np.eye(COMPONENTS)[:, slices]
         for _ in range(FIT_STEPS):
-            parts = [_moved(points, share) for share in shares]
+            gaussians = [_moved(points, share) for share in shares]
             heights = np.array([
-                np.log(share.mean()) + _log_gaussian(part, points) for share, part in zip(shares, parts, strict=True)
+                np.log(share.mean()) + _log_gaussian(gaussian, points)
+                for share, gaussian in zip(shares, gaussians, strict=True)
             ])  # fmt: skip
             total = np.logaddexp.reduce(heights, axis=0)
             shares = np.maximum(np.exp(heights - total), 1e-3)

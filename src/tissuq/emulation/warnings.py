@@ -124,8 +124,8 @@ def _no_parameters_fit(
     draws, measured, size = posterior.thinned(DRAWS_NEAR_FAILURES), problem.measured, len(problem.measured)
     points, outputs = emulator.runs.good
     at_draws = likelihood.misfits(draws)
-    others = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
-    misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, others])).min())
+    of_discrepancy = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
+    misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, of_discrepancy])).min())
     is_out = (measured < outputs.min(axis=0)) | (measured > outputs.max(axis=0))
     is_absorbed = problem.discrepancy.name == "gp" or None in problem.noise_sd.values()  # by what is unknown
     is_out_of_reach = is_absorbed and is_out.mean() > MAX_SHARE_OUT_OF_REACH
@@ -200,10 +200,10 @@ def _large_error(
         )
     elif shifts[largest_shift] > MAX_MEAN_SHIFT:
         shift = shifts[largest_shift]
-        many = f"{shift:.1f}" if shift < MAX_SHIFT_IN_SDS else f"more than {MAX_SHIFT_IN_SDS}"
+        multiple = f"{shift:.1f}" if shift < MAX_SHIFT_IN_SDS else f"more than {MAX_SHIFT_IN_SDS}"
         yield (
-            f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by {many} standard "
-            f"deviations. {advice}"
+            f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by {multiple} "
+            f"standard deviations. {advice}"
         )
 
 

@@ -49,8 +49,8 @@ def unloading(points: ArrayLike, reference: ArrayLike) -> NDArray[np.bool_]:
     if values.ndim > 1 or len(values) < 2 * FEWEST:
         return is_back
     bounds = [-1, *turning_points(values), len(values) - 1]
-    for before, start, stop in zip(bounds, bounds[1:], bounds[2:], strict=False):
-        if start - before >= FEWEST and stop - start >= FEWEST:
+    for previous, start, stop in zip(bounds, bounds[1:], bounds[2:], strict=False):
+        if start - previous >= FEWEST and stop - start >= FEWEST:
             rows = np.arange(start + 1, stop + 1)
             way = np.sign(values[stop] - values[start])
             is_back[rows] = way * (values[rows] - float(np.asarray(reference))) <= 0

@@ -177,16 +177,16 @@ def _few_integrated(precision: FloatArray, pull: FloatArray, size: FloatArray) -
     log_volume = np.zeros(precision.shape[:-2])
     for i in range(p):
         for j in range(i):
-            known = sum(triangle[i, k] * triangle[j, k] for k in range(j))
-            triangle[i, j] = (precision[..., i, j] - known) * inverse[..., j, j]
+            partial_sum = sum(triangle[i, k] * triangle[j, k] for k in range(j))
+            triangle[i, j] = (precision[..., i, j] - partial_sum) * inverse[..., j, j]
         square = precision[..., i, i] - sum(triangle[i, k] ** 2 for k in range(i))
         if (square <= 0).any():  # what is no number stays none, as with the library
             raise np.linalg.LinAlgError("the precision of the linear parameters is not positive")
         inverse[..., i, i] = 1 / np.sqrt(square)
         log_volume -= 0.5 * np.log(square)
         for j in range(i):
-            known = sum(triangle[i, k] * inverse[..., k, j] for k in range(j, i))
-            inverse[..., i, j] = -known * inverse[..., i, i]
+            partial_sum = sum(triangle[i, k] * inverse[..., k, j] for k in range(j, i))
+            inverse[..., i, j] = -partial_sum * inverse[..., i, i]
     scores = inverse @ pull
     return Integrated(log_volume, size - (scores**2).sum(axis=-2), inverse.swapaxes(-1, -2), scores)
 

@@ -175,11 +175,11 @@ def _rectangle(triangle: FloatArray, low: FloatArray, high: FloatArray) -> Float
         value = np.where(h >= CERTAIN_SCORE, ndtr(k), np.where(k >= CERTAIN_SCORE, ndtr(h), 0.0))
         inner = np.flatnonzero(np.maximum(np.abs(h), np.abs(k)) < CERTAIN_SCORE)
         h, k = h[inner], k[inner]
-        both = 0.5 * (ndtr(h) + ndtr(k)) - np.where(h * k < 0, 0.5, 0.0)
+        joint = 0.5 * (ndtr(h) + ndtr(k)) - np.where(h * k < 0, 0.5, 0.0)
         with np.errstate(over="ignore"):
-            both -= owens_t(h, (k - correlation[inner] * h) / (h * complement[inner]))
-            both -= owens_t(k, (h - correlation[inner] * k) / (k * complement[inner]))
-        value[inner] = both
+            joint -= owens_t(h, (k - correlation[inner] * h) / (h * complement[inner]))
+            joint -= owens_t(k, (h - correlation[inner] * k) / (k * complement[inner]))
+        value[inner] = joint
         return np.asarray(value)
 
     scores = (np.clip(end / sd, -MAX_SCORE, MAX_SCORE) for end in (low, high))

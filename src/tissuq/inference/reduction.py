@@ -207,7 +207,9 @@ class Reducer:
         is_plain = not model.is_correlated and not model.noise.depends_on_level
         if bent and is_plain:
             blocks_of_designs = _designs(model, settings)
-            return [one for block in blocks_of_designs for one in _of_independent_errors(self._models, block)]
+            return [
+                reduction for block in blocks_of_designs for reduction in _of_independent_errors(self._models, block)
+            ]
         if bent:
             fits = (_Fit.of(self._models, design) for block in _designs(model, settings) for design in block)
             pairs = zip(fits, settings, strict=True)

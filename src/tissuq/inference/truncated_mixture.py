@@ -119,9 +119,9 @@ class TruncatedMixture:
     def _bounds(self, index: int) -> tuple[float, float]:
         return float(self.box.lower[0, index]), float(self.box.upper[0, index])
 
-    def _crossed_marginals(self, index: int, most: int) -> list[tuple[float, Marginal]]:
+    def _crossed_marginals(self, index: int, components: int) -> list[tuple[float, Marginal]]:
         """Return marginals of what several bounds cut, with their weights: by which bounds these are."""
-        thinned, share = self.crossed.thinned(most), self.crossed.weights.sum()
+        thinned, share = self.crossed.thinned(components), self.crossed.weights.sum()
         active = self._boxes(thinned).beyond(thinned.mean, thinned.root) > TOUCHED_MASS
         active[:, index] = True
         marginals = []
@@ -129,7 +129,7 @@ class TruncatedMixture:
             gaussians = thinned[(active == pattern).all(axis=1)]
             order = np.array([index, *(k for k in np.flatnonzero(pattern) if k != index)])
             if len(order) > MAX_NESTED:
-                points = self._points(gaussians, max(64, POINTS_PER_COMPONENT * most // len(gaussians)))
+                points = self._points(gaussians, max(64, POINTS_PER_COMPONENT * components // len(gaussians)))
                 marginal = marginal_of_points(points.mean[:, index], points.weights, self._bounds(index))
             else:
                 low, high = ((ends[0] - gaussians.mean)[:, order] for ends in (self.box.lower, self.box.upper))

@@ -70,8 +70,8 @@ class MeasuredStates:
 
     def contain(self, states: States, rounding: float = ROUNDING) -> Flags:
         """Return which states (n,) are among them, where invariants may be larger by such a share."""
-        first, second = invariants(states)
-        inside = (first <= self.I1 * (1 + rounding)) & (second <= self.I2 * (1 + rounding))
+        reached_I1, reached_I2 = invariants(states)
+        inside = (reached_I1 <= self.I1 * (1 + rounding)) & (reached_I2 <= self.I2 * (1 + rounding))
         if self.strains:
             low, high = np.array(self.strains).T
             strains = states.axis_strains[0]

@@ -59,7 +59,7 @@ def pieces(knots: FloatArray, slopes: FloatArray) -> list[Pieces]:
     functions = CubicSpline(knots, slopes).antiderivative()
     coefficients = functions.c.transpose(2, 0, 1).copy()  # of a function together in memory, which is searched often
     coefficients[:, -1] -= functions(0.0)[:, None]
-    return [Pieces(knots, own) for own in coefficients]
+    return [Pieces(knots, of_draw) for of_draw in coefficients]
 
 
 class PiecewiseEnergy(NamedTuple):

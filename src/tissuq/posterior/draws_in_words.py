@@ -21,7 +21,7 @@ class FailedDraw:
     problem: str
 
 
-def named_draws(numbers: Iterable[int], places: Sequence[str] = ()) -> str:
+def named_draws(numbers: Iterable[int], remarks: Sequence[str] = ()) -> str:
     """Return draws in words: numbered from one, where they come from zero, and of many only the first by their numbers.
 
     Examples
@@ -32,8 +32,8 @@ def named_draws(numbers: Iterable[int], places: Sequence[str] = ()) -> str:
     'draws 1, 2, 3, 4, 5, 6 and 3 others'
     """
     names = [str(number + 1) for number in numbers]
-    if places:
-        names = [f"{name} {place}" for name, place in zip(names, places, strict=True)]
+    if remarks:
+        names = [f"{name} {remark}" for name, remark in zip(names, remarks, strict=True)]
     unnamed = len(names) - MAX_DRAWS_NAMED
     more = f" and {unnamed} other{'s' * (unnamed > 1)}" if unnamed > 0 else ""
     return f"draw{'s' * (len(names) > 1)} {', '.join(names[:MAX_DRAWS_NAMED])}{more}"

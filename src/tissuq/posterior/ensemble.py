@@ -235,11 +235,17 @@ class Ensemble(Sequence[EnergyDraw]):
                 f"{', '.join(self.ranges)}."
             )
         if stretch is None:
-            at = np.linspace(*measured_range(self.model.experiment, loading), PLOT_POINTS)
+            stretches = np.linspace(*measured_range(self.model.experiment, loading), PLOT_POINTS)
         else:
-            at = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
+            stretches = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
         with panels(ax, 1) as drawn:
-            curves(drawn, at, self.stress(loading, at), loading, stress_unit(unit or self.model.experiment.stress_unit))
+            curves(
+                drawn,
+                stretches,
+                self.stress(loading, stretches),
+                loading,
+                stress_unit(unit or self.model.experiment.stress_unit),
+            )
         return drawn.result
 
     def _repr_html_(self) -> str:
@@ -318,8 +324,8 @@ def _stress(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
     stresses = _stress_within(draws, states)
     for row, draw in zip(stresses, draws, strict=True):
         if draw.continuation is not None:
-            beyond, continued = draw.continuation.stress(*states.log_stretches)
-            row[beyond] = continued
+            is_beyond, continued = draw.continuation.stress(*states.log_stretches)
+            row[is_beyond] = continued
     return stresses
 
 
@@ -435,8 +441,8 @@ def _materials(solution: Solution, count: int, seed: list[int], sampling: Sampli
         parameters = dict(zip(model.symbols, map(float, row), strict=True))
         extra_term = model.discrepancy.material_part(parameters)
         base_term = model.material, tuple(parameters[symbol] for symbol in model.material_symbols)
-        parts = (base_term, extra_term) if extra_term else (base_term,)
-        draws.append(EnergyDraw(number, parts, energy, None, float(beyond_scores[number]), float(factor[number])))
+        terms = (base_term, extra_term) if extra_term else (base_term,)
+        draws.append(EnergyDraw(number, terms, energy, None, float(beyond_scores[number]), float(factor[number])))
     return _continued(model, draws, points.member, scores(probability)) if points.member is not None else draws
 
 
@@ -479,8 +485,8 @@ def _continued(
             energies = np.array([draw.energy(stretches) for draw in of_rows])
         exponents = with_errors(rays.last_exponents(at_end, farther_in), score[rows, None])
         is_known = np.isfinite([energies, at_end, *exponents]).all(axis=(0, 2))  # not where the material has locked
-        known = (values[is_known] for values in (energies, at_end, *exponents))
-        for row, continuation in zip(rows[is_known], continuations(rays, *known), strict=True):
+        finite = (values[is_known] for values in (energies, at_end, *exponents))
+        for row, continuation in zip(rows[is_known], continuations(rays, *finite), strict=True):
             continued[row] = replace(draws[row], continuation=continuation)
     return continued
 

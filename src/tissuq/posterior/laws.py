@@ -78,16 +78,16 @@ class LawFit:
         start = perf_counter()
         fitted = fit(data, material=law, priors=priors, **options)
         posterior = replace(fitted, solution=copy(fitted.solution))  # without what it was computed from
-        seconds, alone = perf_counter() - start, None
+        seconds, best_fit = perf_counter() - start, None
         with suppress(ModelError):
-            alone = least_squares(data, law, posterior.model.priors)
+            best_fit = least_squares(data, law, posterior.model.priors)
         modulus = posterior.initial_shear_modulus
-        row = _row(posterior, modulus, alone) | {"seconds": seconds}
+        row = _row(posterior, modulus, best_fit) | {"seconds": seconds}
         _ = (
             posterior.left_out,
             posterior.warnings,
         )  # which every comparison asks for, while laws are fitted side by side
-        return cls(posterior, alone, modulus, row)
+        return cls(posterior, best_fit, modulus, row)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,12 +175,12 @@ class LawComparison:
         InputError
             When none has an evidence.
         """
-        known = {name: posterior.log_evidence for name, posterior in self.fits.items()}
-        evidences = np.array([np.nan if evidence is None else evidence for evidence in known.values()])
+        log_evidences = {name: posterior.log_evidence for name, posterior in self.fits.items()}
+        evidences = np.array([np.nan if evidence is None else evidence for evidence in log_evidences.values()])
         if np.isnan(evidences).all():
             raise InputError("no fit has an evidence, by which laws are weighted: use the method 'auto' or 'exact'.")
         weights = np.nan_to_num(np.exp(evidences - np.nanmax(evidences)))
-        return dict(zip(known, (weights / weights.sum()).tolist(), strict=True))
+        return dict(zip(log_evidences, (weights / weights.sum()).tolist(), strict=True))
 
     @cached_property
     def modulus(self) -> Marginal:
@@ -348,7 +348,7 @@ def fit_laws(
     return LawComparison(fits, skipped)
 
 
-def _row(posterior: Posterior, modulus: Marginal, alone: LeastSquares | None) -> dict[str, Any]:
+def _row(posterior: Posterior, modulus: Marginal, best_fit: LeastSquares | None) -> dict[str, Any]:
     """Return what a table says of a law, moduli in MPa."""
     share, _ = shares_of_discrepancy(posterior.solution)
     stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
@@ -357,8 +357,8 @@ def _row(posterior: Posterior, modulus: Marginal, alone: LeastSquares | None) ->
         "parameters": len(posterior.model.material.parameters),
         "log_evidence": np.nan if posterior.log_evidence is None else posterior.log_evidence,
         "log_evidence_error": posterior.log_evidence_error or np.nan,
-        "r_squared": np.nan if alone is None else alone.r_squared,
-        "nrmse": np.nan if alone is None else alone.nrmse,
+        "r_squared": np.nan if best_fit is None else best_fit.r_squared,
+        "nrmse": np.nan if best_fit is None else best_fit.nrmse,
         **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),
         "stable": min(stable, default=np.nan),
         "stable_beyond": min((of_mode.probability for of_mode in ranges_beyond), default=np.nan),

@@ -116,17 +116,17 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
         bases = stress_basis(material, states, values_at(starts))
         misfits = np.array([(linear(basis)[1] ** 2).sum() for basis in bases])
         best = starts[np.argsort(misfits)[:REFINED]]
-        found = [refined(residual, start, bounds=(-MAX_SCORE, MAX_SCORE), x_scale=1.0) for start in best]
-        scores = min(found, key=lambda result: result.cost).x[None]
+        optima = [refined(residual, start, bounds=(-MAX_SCORE, MAX_SCORE), x_scale=1.0) for start in best]
+        scores = min(optima, key=lambda result: result.cost).x[None]
     values = np.empty(len(is_linear))
     values[~is_linear] = values_at(scores)[0] if bent else []
     values[is_linear] = unit * linear(stress_basis(material, states, values[~is_linear]))[0]
-    measured, left = data.measured, data.measured - _stress(material, data.states, values)
-    if not np.isfinite(left).all():
+    measured, residuals = data.measured, data.measured - _stress(material, data.states, values)
+    if not np.isfinite(residuals).all():
         raise ModelError(f"material '{material.name}' has no stress at some of the measurements.")
     total = ((measured - measured.mean()) ** 2).sum()
-    nrmse = float(np.sqrt((left**2).mean() / (measured**2).mean()))
-    r_squared = float(1 - (left**2).sum() / total) if total else np.nan
+    nrmse = float(np.sqrt((residuals**2).mean() / (measured**2).mean()))
+    r_squared = float(1 - (residuals**2).sum() / total) if total else np.nan
     return LeastSquares(material, values, r_squared, nrmse)
 
 

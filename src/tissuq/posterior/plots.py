@@ -106,9 +106,9 @@ class PosteriorPlots:
             As of `plot`; a panel for every stress of the mode.
         """
         loading = loading_mode(mode) if mode is not None else self.solution.model.experiment.modes[0]
-        found = predictions(self.solution, loading, stretch, prob)
-        with panels(ax, len(found)) as drawn:
-            prediction(drawn, found, self._unit(unit), prob)
+        predicted = predictions(self.solution, loading, stretch, prob)
+        with panels(ax, len(predicted)) as drawn:
+            prediction(drawn, predicted, self._unit(unit), prob)
         return drawn.result
 
     def plot_parameters(
@@ -200,14 +200,14 @@ def plot_compare(
     >>> plt.close(axis.figure)
     """
     named = _named(posteriors)
-    chosen = parameter or MODULUS
+    symbol = parameter or MODULUS
     for solution in named.values():
-        marginal_of(solution, chosen)
-    first = next(iter(named.values()))
+        marginal_of(solution, symbol)
+    first_solution = next(iter(named.values()))
     with panels(ax, 1, height=ROW * len(named) + 0.3) as drawn:
-        shown = stress_unit(unit or first.model.experiment.stress_unit)
+        shown = stress_unit(unit or first_solution.model.experiment.stress_unit)
         shown_names = {fill(name, LETTERS_OF_NAME): solution for name, solution in named.items()}
-        ridges(drawn.axes[0], shown_names, chosen, shown, prob=prob, truth=truth)
+        ridges(drawn.axes[0], shown_names, symbol, shown, prob=prob, truth=truth)
     return drawn.result
 
 

@@ -238,13 +238,13 @@ def _spreads_that_are_told(experiment: Experiment) -> Sequence[tuple[str, ...]]:
     return [(TestError.name,), (ScaleError.name,)][: min(specimens, 2)]
 
 
-def _peak(places: FloatArray, values: FloatArray) -> float:
-    """Return where a function is largest: at an end of its places (n,), or on the parabola through the best three."""
+def _peak(points: FloatArray, values: FloatArray) -> float:
+    """Return where a function is largest: at an end of points (n,), or on the parabola through the best three."""
     best = int(np.argmax(values))
     if best in (0, len(values) - 1):
-        return float(places[best])
+        return float(points[best])
     neighbours = slice(best - 1, best + 2)
-    curvature, slope, _ = np.polyfit(places[neighbours], values[neighbours], 2)
+    curvature, slope, _ = np.polyfit(points[neighbours], values[neighbours], 2)
     return float(-slope / (2 * curvature))
 
 
@@ -299,8 +299,8 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
     if specimens_of(model.experiment).shape[1] > 1:
         return (BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)).at_least(model.experiment.least_errors)
     is_told = len(model.experiment.tests) == 1 and (not model.noise.parameters or model.experiment.size > CHUNK)
-    usual = Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
-    return usual.at_least(model.experiment.least_errors)
+    tolerances = Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
+    return tolerances.at_least(model.experiment.least_errors)
 
 
 def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tolerances:

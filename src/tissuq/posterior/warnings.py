@@ -114,8 +114,8 @@ def warnings_about(
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     lag1, held = _lag1_correlation(solution), int(inside.sum())
-    if apart := _tests_apart(solution):
-        yield ResultWarning(apart, "tests-apart")
+    if between_tests := _tests_apart(solution):
+        yield ResultWarning(between_tests, "tests-apart")
     elif lag1 is not None:
         yield _correlated_residuals(solution.model, lag1)
     elif not cut and bdtr(held, len(inside), 0.95) < MAX_PROBABILITY_OF_MISSES:
@@ -278,13 +278,13 @@ def _tests_apart(solution: Solution) -> str:
 def _influence_of_priors(solution: Solution) -> str:
     """Return in words that priors which were given, no bounds alone, determine the modulus as much as the data do."""
     model = solution.model
-    given = [symbol for symbol in modulus_symbols(model) if symbol in model.chosen_priors]
-    if all(isinstance(model.chosen_priors[symbol], Uniform) for symbol in given):
+    symbols = [symbol for symbol in modulus_symbols(model) if symbol in model.chosen_priors]
+    if all(isinstance(model.chosen_priors[symbol], Uniform) for symbol in symbols):
         return ""
     sensitivity = power_scaling(solution)
     if sensitivity is None or sensitivity.prior < MIN_SENSITIVITY:
         return ""
-    words = f"the prior that was given for {' and '.join(given)} determines the result "
+    words = f"the prior that was given for {' and '.join(symbols)} determines the result "
     if sensitivity.likelihood < MIN_SENSITIVITY:
         return words + "more than the data do: without it the result would be another one, unless both agree."
     return words + "as much as the data do, and the two may contradict each other: see what the data say without it."

@@ -145,5 +145,5 @@ class ImposedStretches(LoadingMode):
         return f"{self.mode.name} along axis {self.axis}"
 
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
-        first, second, third = self.mode.principal_stretches(point)
-        return (first, second, third) if self.axis == 1 else (second, first, third)
+        stretch_1, stretch_2, stretch_3 = self.mode.principal_stretches(point)
+        return (stretch_1, stretch_2, stretch_3) if self.axis == 1 else (stretch_2, stretch_1, stretch_3)

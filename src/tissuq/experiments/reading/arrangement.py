@@ -137,8 +137,10 @@ def _as_one(tables: Sequence[Table]) -> Table:
     """Return tables beneath one another as one, with a note."""
     rows = [*chain.from_iterable(table.rows for table in tables)]
     lines = [*chain.from_iterable(table.lines for table in tables)]
-    whole = replace(tables[0], rows=rows, lines=lines)
-    return whole.noted(f"{len(tables)} tables in {whole.span} go on from one another, and are read as one.")
+    single_table = replace(tables[0], rows=rows, lines=lines)
+    return single_table.noted(
+        f"{len(tables)} tables in {single_table.span} go on from one another, and are read as one."
+    )
 
 
 def _goes_on(first_row: str, table: Table, later: Table) -> bool:

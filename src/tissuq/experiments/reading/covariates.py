@@ -56,20 +56,20 @@ class CovariateTable:
         InputError
             When rows of one specimen differ.
         """
-        found: dict[str, dict[str, str]] = {specimen: {} for specimen in self._rows}
+        by_specimen: dict[str, dict[str, str]] = {specimen: {} for specimen in self._rows}
         for name, column in self.columns.items():
             texts, rows = self.table.texts(column), dict[str, int]()
             for row, (specimen, cell) in enumerate(zip(self.specimens, texts, strict=True)):
-                known = rows.setdefault(specimen, row) if cell else row
-                if texts[known] != cell:
+                filled_row = rows.setdefault(specimen, row) if cell else row
+                if texts[filled_row] != cell:
                     raise InputError(
                         f"{self.table.place(column, row)}: '{cell}' for specimen '{specimen}', which has "
-                        f"'{texts[known]}' in {self.table.counted} {self.table.lines[known]}. "
+                        f"'{texts[filled_row]}' in {self.table.counted} {self.table.lines[filled_row]}. "
                         "A covariate is the same in all rows of a specimen."
                     )
-            for specimen, values in found.items():
+            for specimen, values in by_specimen.items():
                 values[name] = texts[rows[specimen]] if specimen in rows else ""
-        return found
+        return by_specimen
 
     def place(self, specimen: str, covariate: str) -> str:
         """Return where the value of a specimen, and of a covariate, stands."""

@@ -246,8 +246,8 @@ def _outliers(tested: TestedStress) -> Iterator[Region]:
 def _copies(tested: TestedStress) -> Iterator[Region]:
     """Yield rows that are those from further above once more: no second cycle is equal to the last digit."""
     measured = np.vstack([tested.used.stretch, tested.used.stress])
-    _, first, number = np.unique(measured, axis=1, return_index=True, return_inverse=True)
-    origin = first[number.ravel()]
+    _, first_rows, number = np.unique(measured, axis=1, return_index=True, return_inverse=True)
+    origin = first_rows[number.ravel()]
     is_next = (origin[1:] < np.arange(1, len(origin))) & (np.diff(origin) == 1) & (np.diff(measured[-1]) != 0)
     runs = np.split(np.arange(1, len(origin)), np.flatnonzero(np.diff(is_next)) + 1)
     runs = [np.append(run[0] - 1, run) for run in runs if len(run) >= FEWEST_COPIED_ROWS - 1 and is_next[run[0] - 1]]

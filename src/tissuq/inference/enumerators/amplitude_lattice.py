@@ -270,9 +270,9 @@ class _EnergySums:
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
         return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components(few)
 
-    def _marginal(self, most: int, symbol: str) -> Marginal:
+    def _marginal(self, components: int, symbol: str) -> Marginal:
         if symbol in self.model.linear:
-            return self._truncated.marginal(self.model.linear.index(symbol), most)
+            return self._truncated.marginal(self.model.linear.index(symbol), components)
         if symbol == "noise_sd":
             return self._noise_marginal()
         values = self._settings(self._points, self._node)[:, self.model.nonlinear.index(symbol)]

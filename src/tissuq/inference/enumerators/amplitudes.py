@@ -185,8 +185,8 @@ class Weighing:
         misfit = lattice.misfit[(*indices, self._index)]
         amplitudes, nothing = np.zeros((len(misfit), len(self._model.energy_symbols))), np.zeros(len(misfit))
         pairs = zip(lattice.ratios, indices[::-1], strict=True)
-        for amplitude, (grid, place) in zip(lattice.member.amplitude_indices, pairs, strict=False):
-            amplitudes[:, amplitude] = grid[place] * noise_sd
+        for amplitude, (grid, indices_on_grid) in zip(lattice.member.amplitude_indices, pairs, strict=False):
+            amplitudes[:, amplitude] = grid[indices_on_grid] * noise_sd
         noise, log_weight = np.full(len(misfit), noise_sd), self._log_weights[member][indices]
         of_member = np.full(len(misfit), member)
         return Points(of_member, indices[0], indices[1], noise, amplitudes, log_weight, misfit, nothing, nothing)
@@ -359,8 +359,8 @@ def noise_grid(model: StatisticalModel, points: Points, freedom: int, count: int
     reach_below, reach_above = _reach(freedom)
     taken = np.log(points.noise_sd)  # which a prior may draw away from what is likely by the data alone
     ends = min(low.min() - reach_below, taken.min()), max(high.max() + reach_above, taken.max())
-    first, last = np.clip(ends, *_ends(model, {}))
-    return np.exp(np.linspace(first, last, count))
+    lowest, highest = np.clip(ends, *_ends(model, {}))
+    return np.exp(np.linspace(lowest, highest, count))
 
 
 def _ends(model: StatisticalModel, ratios: Mapping[str, float]) -> FloatArray:

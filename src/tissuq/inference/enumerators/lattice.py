@@ -232,8 +232,10 @@ class Lattice:
         columns = fit.columns.swapaxes(0, 1).reshape(count, designs * (p + k))
         inside = directions.basis.T @ columns
         outside = columns - directions.basis @ inside
-        parts = (*directions.along(inside), outside)
-        along, remaining, outside = (part.reshape(*part.shape[:-1], designs, p + k) for part in parts)
+        projections = (*directions.along(inside), outside)
+        along, remaining, outside = (
+            projection.reshape(*projection.shape[:-1], designs, p + k) for projection in projections
+        )
         # A sum along the directions, for each of their variances, of every product that is needed.
         products = _products(along, p)
         of_unit_variance = _summed_products(remaining, p) + _summed_products(outside, p)

@@ -98,11 +98,11 @@ class NoiseGrid:
         _, mean_sd = model.noise_of_tests
 
         def log_weight(
-            of: StatisticalModel, solve_known: Callable[[StatisticalModel], Solution], log_noise: float
+            fitted_model: StatisticalModel, solve_known: Callable[[StatisticalModel], Solution], log_noise: float
         ) -> float:
             """Return the logarithm of the posterior density of the logarithm of the noise, up to a constant."""
             noise_sd = np.exp(log_noise)
-            solutions[log_noise] = solve_known(at_noise(of, noise_sd))
+            solutions[log_noise] = solve_known(at_noise(fitted_model, noise_sd))
             log_evidence = solutions[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
@@ -113,8 +113,8 @@ class NoiseGrid:
         high = np.log(END_FACTOR * (model.fitted_errors.level or mean_sd))
         low = min(np.log((model.tolerances.resolution or MIN_NOISE_SHARE) * largest / END_FACTOR), high - MAX_STEP)
         low, high = (low, high) if ends[0] < high and low < ends[1] else ends
-        first = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
-        nodes = _nodes(*_refined(partial(log_weight, sketch, self.known_solver(ROUGH)), first, ends))
+        initial = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
+        nodes = _nodes(*_refined(partial(log_weight, sketch, self.known_solver(ROUGH)), initial, ends))
         logs, log_weights = _widened(partial(log_weight, model, self.known_solver(FINE)), nodes, ends)
         return _joined(model, [solutions[float(value)] for value in logs], logs, log_weights, seed)
 
@@ -152,10 +152,10 @@ def _spaced(low: float, high: float) -> FloatArray:
 
 
 def _refined(
-    function: Callable[[float], float], first: FloatArray, ends: tuple[float, float]
+    function: Callable[[float], float], initial: FloatArray, ends: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Return values between two ends, between which a function is known, and its values; elsewhere it is negligible."""
-    values = {float(log_noise): function(float(log_noise)) for log_noise in first}
+    values = {float(log_noise): function(float(log_noise)) for log_noise in initial}
     while len(values) < MAX_VALUES:
         log_noises = np.array(sorted(values))
         logs = np.array([values[log_noise] for log_noise in log_noises])
@@ -219,8 +219,10 @@ def _joined(
     def marginal(symbol: str) -> Marginal:
         if symbol == SYMBOL:
             return marginal_of_table(np.exp(table), density / np.exp(table))
-        parts = [(float(share), solution.marginals[symbol]) for share, solution in zip(shares, solutions, strict=True)]
-        return blended(parts, model.priors[symbol].support)
+        weighted = [
+            (float(share), solution.marginals[symbol]) for share, solution in zip(shares, solutions, strict=True)
+        ]
+        return blended(weighted, model.priors[symbol].support)
 
     matters = shares > NEGLIGIBLE_SHARE
     solutions = [solution for solution, is_kept in zip(solutions, matters, strict=True) if is_kept]

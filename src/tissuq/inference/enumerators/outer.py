@@ -76,10 +76,10 @@ class Outer:
         pairs = zip(self.symbols, settings, self.of_noise, strict=True)
         return {symbol: float(value) for symbol, value, of_noise in pairs if of_noise}
 
-    def alike(self, settings: FloatArray, most: int) -> Iterator[NDArray[np.intp]]:
+    def alike(self, settings: FloatArray, count: int) -> Iterator[NDArray[np.intp]]:
         """Yield the rows of settings (N, d), so many at once at the most, of which the relative noise is the same."""
-        most = 1 if self.of_noise.any() else most
-        return iter(np.split(np.arange(len(settings)), range(most, len(settings), most)))
+        count = 1 if self.of_noise.any() else count
+        return iter(np.split(np.arange(len(settings)), range(count, len(settings), count)))
 
     def rows(self, settings: FloatArray) -> Rows:
         """Return the measurements with these parameters given, (D, d), of which the relative noise is the same."""

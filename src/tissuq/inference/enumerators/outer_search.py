@@ -67,14 +67,14 @@ class _Search:
         """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
         places = guide.places
         if places is None:
-            scout = known_along(lambda at: self._scouted(at[:, None]), first_places(), MAX_SCORE)
+            scout = known_along(lambda scores: self._scouted(scores[:, None]), first_places(), MAX_SCORE)
             places = scout.spread(guide.accuracy)
         nodes: dict[float, Node] = {}
 
-        def log_density(at: FloatArray) -> FloatArray:
-            new = self._nodes(at[:, None])
-            nodes.update(zip(at.tolist(), new, strict=True))
-            return self._log_masses(new, at[:, None])
+        def log_density(scores: FloatArray) -> FloatArray:
+            new = self._nodes(scores[:, None])
+            nodes.update(zip(scores.tolist(), new, strict=True))
+            return self._log_masses(new, scores[:, None])
 
         self._leave_out_members(places[[len(places) // 2]])
         places = np.concatenate([places, self._peaks(guide)])
@@ -90,8 +90,8 @@ class _Search:
         model = self._sums.model
         freedom, noise = model.experiment.size - len(model.linear), model.noise
 
-        def log_likelihood(at: FloatArray) -> FloatArray:
-            settings, misfit = self._settings(at[:, None]), np.empty(len(at))
+        def log_likelihood(scores: FloatArray) -> FloatArray:
+            settings, misfit = self._settings(scores[:, None]), np.empty(len(scores))
             for rows in self._outer.alike(settings, len(settings)):
                 misfit[rows] = (self._outer.rows(settings[rows]).fit.left ** 2).sum(axis=(1, 2))
             if noise.parameters:
