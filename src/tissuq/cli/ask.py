@@ -78,18 +78,20 @@ def _chosen(
 ) -> dict[str, Any] | None:
     """Return the settings with the answer that a person types; None to leave things as they are ``now``."""
     print(f"\n{fill(question, WIDTH)}")
-    given = {answer: _what_it_gives(file, answer, settings, question, is_only_file=is_only_file) for answer in answers}
+    outcomes = {
+        answer: _what_it_gives(file, answer, settings, question, is_only_file=is_only_file) for answer in answers
+    }
     if now is not None:
-        is_read = {answer: text for answer, text in given.items() if not text.startswith(REFUSED)}
-        given = is_read or given
+        is_read = {answer: text for answer, text in outcomes.items() if not text.startswith(REFUSED)}
+        outcomes = is_read or outcomes
     helpful = sorted(
-        (answer for answer in given if given[answer]), key=lambda answer: given[answer].startswith(REFUSED)
+        (answer for answer in outcomes if outcomes[answer]), key=lambda answer: outcomes[answer].startswith(REFUSED)
     )
     listed = (helpful or answers)[:MOST_ANSWERS]
     if now is not None:
         print(f"  Enter  leave it: {tests_in_words(now)}")
     for number, answer in enumerate(listed, start=1):
-        print(fill(f"{number}  {answer.text}: {given.get(answer, '')}", WIDTH, initial_indent="  ",
+        print(fill(f"{number}  {answer.text}: {outcomes.get(answer, '')}", WIDTH, initial_indent="  ",
                    subsequent_indent="     "))  # fmt: skip
     while True:
         typed = _typed(f"Number{'' if now is None else ', Enter'} or options [1 to {len(listed)}]: ")

@@ -95,13 +95,13 @@ class Call(Generic[Kind, How]):
 
     def check_source(self, setting: str, what: str, earlier: str) -> None:
         """Refuse a call with neither or both of a source of data, which is a setting, and a file of settings."""
-        given = self.stated.get(setting)
-        if given and self.config:
+        source = self.stated.get(setting)
+        if source and self.config:
             raise InputError(
                 f"'{self.config}' is of a {earlier}, and names what that is of: leave out --config, or {what} "
-                f"({_shown(given)})."
+                f"({_shown(source)})."
             )
-        if not (given or self.config):
+        if not (source or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
 
     @cached_property
@@ -198,9 +198,9 @@ class Call(Generic[Kind, How]):
         return study
 
 
-def _shown(given: Any) -> str:
+def _shown(files: Any) -> str:
     """Return a file, or several, as they were typed."""
-    return " ".join(map(str, given)) if isinstance(given, list | tuple) else str(given)
+    return " ".join(map(str, files)) if isinstance(files, list | tuple) else str(files)
 
 
 def not_converged(names: list[str]) -> None:

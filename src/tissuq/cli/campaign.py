@@ -33,10 +33,10 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
         return
     if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    there, here = _without(recipe.read_text(encoding="utf-8"), free), _without(_recipe(settings), free)
-    if there != here:
-        names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-        said = ", ".join(f"{name}: {there.get(name, 'none')} there, {here.get(name, 'none')} here" for name in names)
+    stored, wanted = _without(recipe.read_text(encoding="utf-8"), free), _without(_recipe(settings), free)
+    if stored != wanted:
+        names = [name for name in {**stored, **wanted} if stored.get(name) != wanted.get(name)]
+        said = ", ".join(f"{name}: {stored.get(name, 'none')} there, {wanted.get(name, 'none')} here" for name in names)
         raise InputError(
             f"'{folder}' holds a campaign with other settings ({said:.{MAX_LETTERS}}): choose another folder (--out)."
         )

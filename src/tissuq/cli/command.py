@@ -91,10 +91,10 @@ class Command(TyperCommand):
 
 def settings_of(name: str) -> type[Settings] | None:
     """Return the class of what the file of a command may hold, None where it takes no file."""
-    kind, whole = CONFIGURED.get(name, (None, ""))
-    if not whole:
+    kind, location = CONFIGURED.get(name, (None, ""))
+    if not location:
         return kind
-    module, _, of_file = whole.partition(":")
+    module, _, of_file = location.partition(":")
     of_whole_file: type[Settings] = getattr(import_module(module), of_file)
     return of_whole_file
 

@@ -93,7 +93,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
     if call.config and (run or model):
         raise InputError(
             f"'{call.config}' names the runs and the model of the ensemble that it repeats: leave out --config, or "
-            f"{' '.join(str(each) for each in (run, model) if each)}."
+            f"{' '.join(str(source) for source in (run, model) if source)}."
         )
     if not (model or call.config):
         raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
@@ -114,10 +114,10 @@ def _stored(prepared: PreparedEnsemble, sources: list[str], beside: Path) -> Ens
     from tissuq.studies.finer_model import FINER
 
     settings = prepared.settings
-    places = {source: f"{POSTERIORS}/{number}/{SOURCE}" for number, source in enumerate(sources, start=1)}
+    stored_runs = {source: f"{POSTERIORS}/{number}/{SOURCE}" for number, source in enumerate(sources, start=1)}
     changes: dict[str, Any] = {
         "model": f"{MODEL}/{prepared.deck.main}",
-        "materials": {name: places[source] for name, source in settings.materials.items()},
+        "materials": {name: stored_runs[source] for name, source in settings.materials.items()},
         "also": [stored_place(prepared.deck, beside / file) for file in settings.also],
     }
     if prepared.finer is not None:

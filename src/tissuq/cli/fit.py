@@ -55,7 +55,7 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
         _check_once(call.how.specimen, modes, noise)
         read_as |= {"mode": modes[0]} if modes else {}
     of_files = [] if call.config else files
-    of_tests, found = measured(of_files, read_as, modes, call.how.specimen, noise, print)
+    of_tests, read_tests = measured(of_files, read_as, modes, call.how.specimen, noise, print)
     if not (paths or call.config):
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     if call.config and len(files) > 1:
@@ -64,16 +64,18 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     is_comparison = len(names) > 1 or names == [ALL]
     if call.config and not names:
         is_comparison = setting_of(call.config, "laws") is not None
-    chosen = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
+    law_settings = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
     laws_of_names = {name: material_named(name, laws=True) for name in names if name != ALL}
     kind = LawSettings if is_comparison else SpecimenSettings
-    settings = call.loaded_as(kind, ("noise", "noise_sd"), **of_tests, **chosen)
+    settings = call.loaded_as(kind, ("noise", "noise_sd"), **of_tests, **law_settings)
     sources = [call.beside / test.file for test in settings.tests or (settings,)]
     if files and call.config:
         _check_same(files[0], sources[0], call.config)
-    readings = settings.readings(call.beside, found)
+    readings = settings.readings(call.beside, read_tests)
     priors_in_mpa(
-        settings, settings.fitted_laws(laws_of_names).values(), Experiment.of([of.experiment for of in readings])
+        settings,
+        settings.fitted_laws(laws_of_names).values(),
+        Experiment.of([reading.experiment for reading in readings]),
     )
     target = call.target(Path("runs") / run_name(paths, call.config, sources))
     if isinstance(settings, LawSettings):
@@ -106,7 +108,7 @@ def _fit_one(
 def _compare_laws(
     call: Call[SpecimenSettings, FitOptions],
     settings: LawSettings,
-    own: dict[str, Material],
+    user_laws: dict[str, Material],
     readings: list[Reading],
     sources: list[Path],
     target: Path,
@@ -117,7 +119,7 @@ def _compare_laws(
 
     study = call.carried_out(
         target,
-        lambda step: run_laws(settings, call.beside, step, own, readings, call.how.workers),
+        lambda step: run_laws(settings, call.beside, step, user_laws, readings, call.how.workers),
         partial(law_result, sources=sources),
     )
     _print_omissions(study)

@@ -58,10 +58,10 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path in files:
         if ask:
-            found, settings = ask_about(path, settings, is_only_file=len(files) == 1)
+            file_tests, settings = ask_about(path, settings, is_only_file=len(files) == 1)
         else:
-            found = find_tests(path, settings, is_only_file=len(files) == 1)
-        tests += found
+            file_tests = find_tests(path, settings, is_only_file=len(files) == 1)
+        tests += file_tests
     inspections = [Inspection.of(reading) for _, reading in tests]
     print(inspections[0] if len(tests) == 1 else overview(inspections))
     if write is not None:

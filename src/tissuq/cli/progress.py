@@ -134,9 +134,9 @@ class Monitor:
             done = f"{self.tasks_done} of {self.tasks} tasks are done" if self.tasks else "what is done"
             return f"stopped; {done} and kept in '{self.folder}'. To go on: {_as_typed()}"
         names = [name for name, _ in self.stages if name]
-        where = f" during '{names[-1]}'" if names else ""
+        stage = f" during '{names[-1]}'" if names else ""
         done = f" (done: {', '.join(names[:-1])})" if names[:-1] else ""
-        return f"stopped{where}{done}; no run was written. To begin again: {_as_typed()}"
+        return f"stopped{stage}{done}; no run was written. To begin again: {_as_typed()}"
 
     def _begin(self, name: str) -> None:
         self._end()
@@ -209,8 +209,8 @@ def _as_typed() -> str:
 def _without_folders() -> str:
     """Return what was typed, but of paths that begin at the root, which a run says nothing of, the names alone."""
     words = [word.partition("=") for word in sys.argv[1:]]
-    ends = [(_name(first), equals, _name(last)) for first, equals, last in words]
-    return shlex.join(["tissuq", *("".join(parts) for parts in ends)])
+    ends = [(_name(option), equals, _name(value)) for option, equals, value in words]
+    return shlex.join(["tissuq", *("".join(pieces) for pieces in ends)])
 
 
 def _name(text: str) -> str:

@@ -38,8 +38,8 @@ def schema_of(name: str) -> dict[str, Any]:
     kind = settings_of(name)
     if kind is None:
         raise InputError(f"no command '{name}' takes --config; choose one of {', '.join(sorted(CONFIGURED))}.")
-    whole = kind.model_json_schema()
+    json_schema = kind.model_json_schema()
     for slot in slots_of(kind):
         if len(slot.path) == 1:
-            whole["properties"][slot.path[0]]["option"] = slot.typed
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **whole}
+            json_schema["properties"][slot.path[0]]["option"] = slot.typed
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **json_schema}

@@ -73,7 +73,7 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
     >>> [answer.text for answer in found]
     ['--stress-unit kPa', '--stress-unit MPa']
     """
-    found: list[Answer] = []
+    answers: list[Answer] = []
     end = -1
     for match in OPTION.finditer(message):
         name, value = match["name"], (match["value"] or "").rstrip(".:")
@@ -81,25 +81,25 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
             continue
         value = "" if name in SWITCHES else "".join(shlex.split(value)) if value.count("'") % 2 == 0 else value
         value = "" if value in WORDS else value
-        is_joined = match.start() == end + 1 and found and not found[-1].leaves_out
+        is_joined = match.start() == end + 1 and answers and not answers[-1].leaves_out
         end = match.start() + len(f"--{name}") if name in SWITCHES else match.end()
         if not value and "eave" in message[: match.start()].rpartition(". ")[2]:
             setting = READING[name].path[-1]
             if {**settings, **(settings.get("dimensions") or {})}.get(setting) is not None:
-                found.append(Answer(((f"--{name}", ""),), setting))
+                answers.append(Answer(((f"--{name}", ""),), setting))
         elif name == "column":
             roles = [value.partition("=")[0], *_other_roles(message[match.end() :])]
             names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
             pairs = [f"{role}={column}" for role in roles for column in names] if names else [value]
-            found += [Answer((("column", pair),)) for pair in pairs]
+            answers += [Answer((("column", pair),)) for pair in pairs]
         elif name in CHOICES and not value:
-            found += [Answer(((name, choice),)) for choice in _values(name)]
+            answers += [Answer(((name, choice),)) for choice in _values(name)]
         elif value or name in SWITCHES or name in DIMENSIONS:
             if is_joined:
-                found[-1] = Answer((*found[-1].options, (name, value)))
+                answers[-1] = Answer((*answers[-1].options, (name, value)))
             else:
-                found.append(Answer(((name, value),)))
-    return list(dict.fromkeys(found))
+                answers.append(Answer(((name, value),)))
+    return list(dict.fromkeys(answers))
 
 
 def options_in(text: str) -> tuple[tuple[str, str], ...]:
@@ -135,8 +135,8 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
     """Return settings of reading with those of an answer, added to columns, sizes and rows that are given already."""
     if answer.leaves_out:
         sizes = {name: size for name, size in (settings.get("dimensions") or {}).items() if name != answer.leaves_out}
-        kept = {name: value for name, value in settings.items() if name != answer.leaves_out}
-        return {**kept, "dimensions": sizes or None}
+        remaining = {name: value for name, value in settings.items() if name != answer.leaves_out}
+        return {**remaining, "dimensions": sizes or None}
     values: dict[str, Any] = {}
     for name, value in answer.options:
         slot = READING[name]
@@ -148,8 +148,8 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
             values[slot.name] = SWITCHES[name] if name in SWITCHES else [*values.get(slot.name, []), value]
     merged = dict(settings)
     for setting, value in stated(READING.values(), values)[0].items():
-        known = merged.get(setting)
-        merged[setting] = {**known, **value} if isinstance(value, dict) and isinstance(known, dict) else value
+        earlier = merged.get(setting)
+        merged[setting] = {**earlier, **value} if isinstance(value, dict) and isinstance(earlier, dict) else value
     return merged
 
 

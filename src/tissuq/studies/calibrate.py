@@ -202,9 +202,9 @@ class _Runs:
         is_begun = (batch_folder / RESULTS).exists()
         forget_results(batch_folder / RESULTS, _has_failed)
         run = partial(run_tasks, carry_out=carry_out, folder=batch_folder, pool=self.pool)
-        first = [] if batch else tasks[: self.first]
-        if first:
-            results = run(first, step=self.step, others_stay=True)
+        first_tasks = [] if batch else tasks[: self.first]
+        if first_tasks:
+            results = run(first_tasks, step=self.step, others_stay=True)
             first_runs = gathered(symbols, results, len(control))
             try:
                 check_first_runs(first_runs, self.problem.measured, self.problem.quantities)
@@ -212,7 +212,7 @@ class _Runs:
                 if not (is_begun or first_runs.failed.all()):  # what solvers wrote of failed runs is to be looked at
                     (batch_folder / RESULTS).unlink()
                 raise
-        reported = {task.label for task in first}
+        reported = {task.label for task in first_tasks}
 
         def step(label: str, is_new: bool) -> None:
             if label not in reported:

@@ -143,11 +143,11 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
 
     if settings.prior_run is None:
         return settings
-    found, correlations = priors_of_run(folder / settings.prior_run, str(settings.material), settings.unit)
+    priors, correlations = priors_of_run(folder / settings.prior_run, str(settings.material), settings.unit)
     stated = settings.priors
     pairs = {",".join(pair): value for pair, value in correlations.items() if not set(pair) & set(stated)}
     changes = {
-        "priors": {symbol: prior.as_dict() for symbol, prior in found.items()} | stated,
+        "priors": {symbol: prior.as_dict() for symbol, prior in priors.items()} | stated,
         "prior_correlations": pairs | settings.prior_correlations,
         "prior_run": None,
     }
@@ -163,13 +163,13 @@ def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measur
         return {"": _measured(tables[0], columns, settings.every)}, experiments
     data: dict[str, Measured] = {}
     for table, (names, controlled) in zip(tables, experiments, strict=True):
-        places = {name: _place(table, name) for name in names}
+        column_of = {name: _place(table, name) for name in names}
         named = controlled if len(tables) > 1 else ""
         requested = settings.control if settings.control is not None else named or None
-        control = _control(table, [*places.values()], requested)
+        control = _control(table, [*column_of.values()], requested)
         data |= {
-            name: _measured(table.without_missing([place]), (control, place), settings.every)
-            for name, place in places.items()
+            name: _measured(table.without_missing([column]), (control, column), settings.every)
+            for name, column in column_of.items()
         }
     return data, experiments
 
@@ -224,8 +224,8 @@ def _control(table: Table, measured: Sequence[int], requested: str | int | None)
     return control
 
 
-def _measured(table: Table, columns: tuple[int, int], every: int) -> Measured:
-    control, measured = (column[::every] for column in table.numbers(columns))
+def _measured(table: Table, columns: tuple[int, int], stride: int) -> Measured:
+    control, measured = (column[::stride] for column in table.numbers(columns))
     control_label, measured_label = (_label(table, index) for index in columns)
     units = declared_unit(table, columns[0]), declared_unit(table, columns[1])
     return Measured(control, measured, control_label, measured_label, units)

@@ -214,8 +214,8 @@ class CalibrationSettings(ModelSettings):
     def _check_noise(self) -> None:
         several = self.measured_names != ("",)
         if isinstance(self.noise_sd, dict) and (not several or set(self.noise_sd) - set(self.quantities)):
-            of = ", ".join(self.quantities) if several else "one quantity, and has no name"
-            raise ValueError(f"the noise (noise_sd) is of {of}; it is given for {', '.join(self.noise_sd)}")
+            owners = ", ".join(self.quantities) if several else "one quantity, and has no name"
+            raise ValueError(f"the noise (noise_sd) is of {owners}; it is given for {', '.join(self.noise_sd)}")
         if several and isinstance(self.noise_sd, float):
             sds = ",".join(f"{name}=SD" for name in self.quantities)
             raise ValueError(f"every quantity has a noise of its own: --noise-sd {sds}, or unknown")
@@ -230,8 +230,10 @@ class CalibrationSettings(ModelSettings):
     @property
     def noises(self) -> dict[str, float | str]:
         """The standard deviation of the noise of everything that was measured."""
-        of = self.noise_sd if isinstance(self.noise_sd, dict) else dict.fromkeys(self.measured_names, self.noise_sd)
-        return {name: of.get(name, "unknown") for name in self.measured_names}
+        noise_of_quantity = (
+            self.noise_sd if isinstance(self.noise_sd, dict) else dict.fromkeys(self.measured_names, self.noise_sd)
+        )
+        return {name: noise_of_quantity.get(name, "unknown") for name in self.measured_names}
 
     @property
     def stretches(self) -> tuple[float, float]:
@@ -335,4 +337,4 @@ class CalibrationSettings(ModelSettings):
     def correlations(self) -> dict[tuple[str, str], float]:
         """Of the priors of pairs of parameters."""
         pairs = {pair.partition(","): value for pair, value in self.prior_correlations.items()}
-        return {(first.strip(), second.strip()): value for (first, _, second), value in pairs.items()}
+        return {(symbol_1.strip(), symbol_2.strip()): value for (symbol_1, _, symbol_2), value in pairs.items()}

@@ -164,10 +164,10 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None, material: str | M
     name = name or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in files:
         available = ", ".join(names)
-        one, several, option = (
+        singular, plural, option = (
             ("law", "laws", "material") if is_of_laws else ("discrepancy", "discrepancies", "discrepancy")
         )
-        what = f"has no {one} '{name}'" if name else f"has several {several}"
+        what = f"has no {singular} '{name}'" if name else f"has several {plural}"
         raise InputError(f"run '{run}' {what}: choose one of {available} (--{option}).")
     return files[name]
 

@@ -84,9 +84,9 @@ class PreparedEnsemble:
         )
         width = len(str(self.settings.draws))
 
-        def task(family: str, number: int, deck: Deck, place: Path, cards_of: str) -> ModelRun:
+        def task(family: str, number: int, deck: Deck, model_folder: Path, cards_of: str) -> ModelRun:
             return ModelRun(
-                family, number, place / MODEL, deck.main, deck.format.name,
+                family, number, model_folder / MODEL, deck.main, deck.format.name,
                 tuple(self.blocks(cards_of, number).items()), self.solver, self.quantities, limits,
                 folder / DRAWS / f"{family}-{number + 1:0{width}d}", timeout, retries, keep, abaqus,
                 "" if deck is self.deck else deck.digest,
@@ -211,10 +211,10 @@ def drawn_materials(
 
 def forget_failures(runs: Sequence[ModelRun], folder: Path) -> None:
     """Take the results of runs that failed off the file of results, and their folders away."""
-    places = {run.key: run.folder.name for run in runs}
+    folder_names = {run.key: run.folder.name for run in runs}
     failed = forget_results(folder / RESULTS, lambda result: bool(result.get("problem") or result.get("misread")))
     for key, result in failed.items():
-        name = places.get(key) or str(result.get("folder", ""))  # the latter where quantities are others
+        name = folder_names.get(key) or str(result.get("folder", ""))  # the latter where quantities are others
         if RUN_FOLDER.fullmatch(name):
             shutil.rmtree(folder / DRAWS / name, ignore_errors=True)
 
@@ -268,11 +268,11 @@ def run_ensemble(
         for task in unique[:1] if prepared.finer is None else (unique[0], unique[-1]):
             if task.key not in read_results(folder / RESULTS):
                 run_tasks([task], carried_out, folder, pool=pool, others_stay=True)
-            first = read_results(folder / RESULTS)[task.key]
-            if first["misread"] and not first["problem"]:
+            result = read_results(folder / RESULTS)[task.key]
+            if result["misread"] and not result["problem"]:
                 raise InputError(
-                    f"{first['misread']} This is kept as the result of {task.label}: when the reason is gone, the same "
-                    "command with --again makes it again."
+                    f"{result['misread']} This is kept as the result of {task.label}: when the reason is gone, the "
+                    "same command with --again makes it again."
                 )
         results = run_tasks(unique, carried_out, folder, pool=pool, limit=limit, step=step)
     by_key = {task.key: {**result, "folder": task.folder.name} for task, result in zip(unique, results, strict=True)}
@@ -295,10 +295,11 @@ def _check_functions(quantities: tuple[Quantity, ...]) -> None:
     for quantity in quantities:
         if isinstance(quantity, FunctionQuantity):
             file = Path(quantity.location.rpartition(":")[0])
-            first = files.setdefault(file.name, file)
-            if first.resolve() != file.resolve():
+            earlier_file = files.setdefault(file.name, file)
+            if earlier_file.resolve() != file.resolve():
                 raise InputError(
-                    f"two files of quantities are called '{file.name}' (--qoi): '{first}' and '{file}'; rename one."
+                    f"two files of quantities are called '{file.name}' (--qoi): '{earlier_file}' and '{file}'; "
+                    "rename one."
                 )
 
 

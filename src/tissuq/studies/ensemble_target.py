@@ -55,8 +55,8 @@ def ensemble_target(text: str, posterior: Posterior, beside: Path) -> QuantityTa
     """
     import pandas as pd
 
-    place, name = _parts(text)
-    folder = beside / place
+    folder_name, name = _parts(text)
+    folder = beside / folder_name
     recipe, table = folder / RECIPE, folder / "draws.csv"
     if not (recipe.is_file() and table.is_file()):
         raise InputError(
@@ -67,7 +67,7 @@ def ensemble_target(text: str, posterior: Posterior, beside: Path) -> QuantityTa
         settings = load_settings(EnsembleSettings, recipe, {})
     name = name or (next(iter(settings.quantities)) if len(settings.quantities) == 1 else "")
     if name not in settings.quantities:
-        options = ", ".join(f"{PREFIX}{place}:{quantity}" for quantity in settings.quantities)
+        options = ", ".join(f"{PREFIX}{folder_name}:{quantity}" for quantity in settings.quantities)
         raise InputError(f"target '{text}': the ensemble has the quantities of these targets: {options}.")
     with damage_reported(table):
         values = pd.read_csv(table)[name].to_numpy(dtype=np.float64)
@@ -90,9 +90,9 @@ def ensemble_target(text: str, posterior: Posterior, beside: Path) -> QuantityTa
 
 def _parts(text: str) -> tuple[str, str]:
     """Return folder and name of the quantity, which may be nothing."""
-    place = text.removeprefix(PREFIX)
-    folder, _, name = place.rpartition(":")
-    return (folder, name) if folder and not {"/", "\\"} & set(name) else (place, "")
+    address = text.removeprefix(PREFIX)
+    folder, _, name = address.rpartition(":")
+    return (folder, name) if folder and not {"/", "\\"} & set(name) else (address, "")
 
 
 def _account(model: StatisticalModel) -> tuple[object, ...]:

@@ -75,16 +75,16 @@ def measured(
         for file, mode in zip(files, _modes(files, modes), strict=True)
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
-    found = [of_test for of_file in of_files for _, of_test in of_file]
+    readings = [of_test for of_file in of_files for _, of_test in of_file]
     if any(reading.get(option) and not any(test.get(option) for test in tests) for option in OPTIONAL_FOR_TESTS):
         find_tests(files[0], reading, is_only_file=True)
     if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
-        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(found)
+        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(readings)
     if len(tests) > len(files):
-        say("\n".join([*lines_of_tests(list(map(Inspection.of, found))), ""]))
+        say("\n".join([*lines_of_tests(list(map(Inspection.of, readings))), ""]))
     stated_noise = noise if noise and len(noise) > 1 else None
     for name, option, values in (
         ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)
@@ -97,7 +97,7 @@ def measured(
             f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for all "
             f"files, or once for each in their order ({', '.join(loading_modes())})."
         )
-    pairs = zip(tests, found, strict=True)
+    pairs = zip(tests, readings, strict=True)
     as_found = [of_test if of_test.experiment.mode.name == test["mode"] else None for test, of_test in pairs]
     return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}, as_found
 

@@ -93,7 +93,9 @@ def finer_model(
     number, order = _middle_draw(ensembles), settings.mesh_order or 1.0
     if settings.cell_ratio is not None:
         return FinerModel(finer, number, settings.cell_ratio, order)
-    sizes = [each.format.mesh_size(list(each.files.values())) if not each.outside else None for each in (deck, finer)]
+    sizes = [
+        model.format.mesh_size(list(model.files.values())) if not model.outside else None for model in (deck, finer)
+    ]
     coarse, fine = sizes
     if coarse is None or fine is None or coarse.dimensions != fine.dimensions:
         raise InputError(
@@ -111,6 +113,6 @@ def finer_model(
 
 def _middle_draw(ensembles: Collection[Ensemble]) -> int:
     """Return the draw whose stress in the tests is in the middle of all, in all materials together."""
-    stresses = [np.abs(each.stresses_at(each.model.experiment.states)).mean(axis=1) for each in ensembles]
+    stresses = [np.abs(ensemble.stresses_at(ensemble.model.experiment.states)).mean(axis=1) for ensemble in ensembles]
     ranks = np.array([np.argsort(np.argsort(of_material)) for of_material in stresses])
     return int(np.argmin(((ranks - ranks.shape[1] // 2) ** 2).sum(axis=0)))

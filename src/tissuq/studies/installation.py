@@ -105,13 +105,13 @@ def programs() -> list[Program]:
 
 def _requirements(extra: str | None) -> list[str]:
     """Return the requirements of an extra, or those without one, without what follows the semicolon."""
-    found = []
+    requirements = []
     for line in metadata.requires("tissuq") or []:
         requirement, _, marker = line.partition(";")
         named = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", marker)
         if (named[1] if named else None) == extra:
-            found.append(requirement.strip())
-    return found
+            requirements.append(requirement.strip())
+    return requirements
 
 
 def _packages(requirements: Iterable[str]) -> list[Package]:
@@ -120,12 +120,12 @@ def _packages(requirements: Iterable[str]) -> list[Package]:
 
 def _package(requirement: str) -> Package:
     """Return what is here of a requirement such as ``arviz-stats[xarray]>=0.8``."""
-    name, least = re.match(r"([\w.-]+)(?:\[[^]]*\])?(?:.*>=\s*([\w.]+))?", requirement).groups()  # type: ignore[union-attr]
+    name, bound = re.match(r"([\w.-]+)(?:\[[^]]*\])?(?:.*>=\s*([\w.]+))?", requirement).groups()  # type: ignore[union-attr]
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         version = None
-    return Package(name, version, least or "0")
+    return Package(name, version, bound or "0")
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -94,9 +94,12 @@ class LawStudy:
         Those of other laws than the recommended one are notes.
         """
         fits = self.comparison.fits
-        own = merged({self.recommended: fits[self.recommended].warnings}, named=True)
-        others = merged({name: fit.warnings for name, fit in fits.items() if name != self.recommended}, named=True)
-        texts = [*own, *(text if text.severity is Severity.PROBLEM else text.as_note() for text in others)]
+        of_recommended = merged({self.recommended: fits[self.recommended].warnings}, named=True)
+        of_others = merged({name: fit.warnings for name, fit in fits.items() if name != self.recommended}, named=True)
+        texts = [
+            *of_recommended,
+            *(text if text.severity is Severity.PROBLEM else text.as_note() for text in of_others),
+        ]
         return most_severe_first([*self.data_warnings, *measurement_warnings(self.experiment), *texts])
 
 

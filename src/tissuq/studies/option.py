@@ -27,8 +27,8 @@ class Settings(BaseModel):
             module, _, name = declared.choices.partition(":")
             choices = get_args(getattr(import_module(module), name))
             if value not in choices:
-                first = ", ".join(map(repr, choices[:-1]))
-                raise ValueError(f"must be {first} or {choices[-1]!r}, not {value!r}")
+                listed = ", ".join(map(repr, choices[:-1]))
+                raise ValueError(f"must be {listed} or {choices[-1]!r}, not {value!r}")
         return value
 
 

@@ -38,7 +38,7 @@ def pairs_of(
         pairs = []
         for text in texts:
             name, _, of_name = (
-                part.strip() for part in (text.rpartition("=") if divided_last else text.partition("="))
+                piece.strip() for piece in (text.rpartition("=") if divided_last else text.partition("="))
             )
             if not (name and of_name):
                 raise InputError(f"'{text}' is not {what} ({option}); write {form}.")
@@ -64,8 +64,8 @@ def number_or_text(text: str) -> float | str:
 def sd_or_unknown(text: str) -> float | str | dict[str, float | str]:
     """Return a standard deviation, or 'unknown'; of several quantities by their names."""
     if "=" in text:
-        each = (part.partition("=") for part in text.split(","))
-        return once_each("--noise-sd", ((name.strip(), number_or_text(value.strip())) for name, _, value in each))
+        pairs = (entry.partition("=") for entry in text.split(","))
+        return once_each("--noise-sd", ((name.strip(), number_or_text(value.strip())) for name, _, value in pairs))
     value = number_or_text(text)
     if isinstance(value, str) and value != "unknown":
         raise InputError(f"--noise-sd must be a number or unknown, not '{text}'.")

@@ -81,9 +81,9 @@ def run_population(
             f"the files give stresses in different units ({', '.join(sorted(units))}), so the unit of the "
             "noise is ambiguous: leave --noise-sd out, or convert the files."
         )
-    known = settings.covariate_table(tests, folder)
-    values = {name: row for name, row in known.values().items() if name not in settings.without} if known else None
-    covariates = covariates_of(values, list(tests), known.place if known else None)
+    table = settings.covariate_table(tests, folder)
+    values = {name: row for name, row in table.values().items() if name not in settings.without} if table else None
+    covariates = covariates_of(values, list(tests), table.place if table else None)
     covariates.row(settings.new_patient)  # raises where there is no such patient, before specimens are fitted
     unit, noise_sd = _unit(tests), None
     if isinstance(settings.noise_sd, dict):

@@ -27,7 +27,7 @@ COVARIATES = "Covariates"
 def known_of_patient(texts: Sequence[str]) -> dict[str, str]:
     """Return the covariates of a new patient from texts such as ``age=60,sex=f``."""
     pairs = pairs_of("--new-patient", "something known of a patient", "COVARIATE=VALUE, as in age=60,sex=f")
-    return pairs([part for text in texts for part in text.split(",")])
+    return pairs([pair for text in texts for pair in text.split(",")])
 
 
 class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):

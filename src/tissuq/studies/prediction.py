@@ -162,7 +162,7 @@ class Prediction:
         """Return some rows of the stress as a table, which notebooks show; `table` has all."""
         import pandas as pd
 
-        unit, places = self.unit, np.unique(np.linspace(0, len(self.points) - 1, ROWS_SHOWN).round().astype(int))
+        unit, rows = self.unit, np.unique(np.linspace(0, len(self.points) - 1, ROWS_SHOWN).round().astype(int))
         kind = self.kinds[0]
         tables = []
         for channel, name in enumerate(self.stresses):
@@ -170,8 +170,8 @@ class Prediction:
             ends = {end: getattr(bands[0], end) for end in ("median", "low", "high")}
             ends |= {f"predictive_{end}": getattr(bands[1], end) for end in ("low", "high")}
             columns = self.controls | {key: values / unit.to_mpa for key, values in ends.items()}
-            table = pd.DataFrame({key: values[places] for key, values in columns.items()})
-            table["is_calibrated"] = self.is_calibrated[places]
+            table = pd.DataFrame({key: values[rows] for key, values in columns.items()})
+            table["is_calibrated"] = self.is_calibrated[rows]
             shown = headed(table, unit).to_html(index=False, float_format="{:.4g}".format)
             tables.append(f"<p>{self.mode.name}, {name} [{unit.name}]</p>{shown}")
         return "".join(tables)
@@ -276,12 +276,12 @@ def draw_prediction(axes: Sequence[Axes], prediction: Prediction) -> None:
     count, across = len(prediction.stresses), len(prediction.kinds)
     for channel in range(count):
         row = axes[channel * across : (channel + 1) * across]
-        found = [_shown(prediction, channel, kind) for kind in prediction.kinds]
-        for axis, of in zip(row, found, strict=True):
-            draw_predicted(axis, of, prediction.unit, predicted_limits(found), prediction.prob)
-            axis.set_title(of.title)
+        predicted = [_shown(prediction, channel, kind) for kind in prediction.kinds]
+        for axis, panel in zip(row, predicted, strict=True):
+            draw_predicted(axis, panel, prediction.unit, predicted_limits(predicted), prediction.prob)
+            axis.set_title(panel.title)
             if prediction.points.ndim > 1 or channel == count - 1:
-                axis.set_xlabel(of.label)
+                axis.set_xlabel(panel.label)
         row[0].set_ylabel(f"{prediction.stresses[channel]} [{prediction.unit.name}]")
 
 

@@ -30,10 +30,10 @@ def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior]
         When there is no such run, or it is of another law, or its posterior has no such form.
     """
     posterior = load(run)
-    law, found = material_named(material), posterior.model.material
-    if law.name != found.name:
+    law, fitted = material_named(material), posterior.model.material
+    if law.name != fitted.name:
         raise InputError(
-            f"the run '{run}' is of the material {found.name}, and the forward model has {law.name}: fit the tests "
+            f"the run '{run}' is of the material {fitted.name}, and the forward model has {law.name}: fit the tests "
             f"with --material {law.name} (--prior-run)."
         )
     return priors_of(posterior, unit)

@@ -135,8 +135,8 @@ def _explain(item: Any, typed: Mapping[str, str]) -> str:
     is_told = item["type"] == "value_error" or isinstance(item["input"], dict)
     value = "" if is_told else f" (it is {item['input']!r})"
     option = next((typed[name] for name in (location, location.partition(".")[0]) if name in typed), None)
-    place = location if option in (None, f"--{location}") else f"{location} ({option})"
-    return f"{place}: {message}{value}" if location else f"{message}{value}"
+    label = location if option in (None, f"--{location}") else f"{location} ({option})"
+    return f"{label}: {message}{value}" if location else f"{message}{value}"
 
 
 def _place(item: Any) -> str:
@@ -167,7 +167,7 @@ def looked_up(find: Callable[[Any], Named], name: Any) -> Named:
 def _errors_there_are(sizes: dict[str, float] | None) -> dict[str, float] | None:
     from tissuq.model.tolerances import Tolerances
 
-    looked_up(lambda given: Tolerances(**given), sizes or {})
+    looked_up(lambda errors: Tolerances(**errors), sizes or {})
     return sizes
 
 

@@ -173,15 +173,15 @@ class SimulationSettings(RunSettings):
         from tissuq.finite_elements.body_from_file import BodyFromFile
         from tissuq.finite_elements.inflated import InflatedBody
 
-        given = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
-        if len(given) != 1 or self.sizes or self.case or bool(self.watch) != bool(self.inflate):
+        loads = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
+        if len(loads) != 1 or self.sizes or self.case or bool(self.watch) != bool(self.inflate):
             raise InputError(
                 "a body from a mesh has no --case or --size, and needs one of --move ymax=y:-0.4, --press ymax=y:-0.4, "
                 "and --inflate inner=2 --watch outer=x."
             )
         if self.tip_radius and not self.press:
-            raise InputError(f"--tip-radius goes with --press: write --press ymax=y:-0.4, not --{next(iter(given))}.")
-        ((name, text),) = given.items()
+            raise InputError(f"--tip-radius goes with --press: write --press ymax=y:-0.4, not --{next(iter(loads))}.")
+        ((name, text),) = loads.items()
         match = LOADS[name].fullmatch(text.strip())
         if match is None:
             form = "SET=PRESSURE, as in inner=2" if self.inflate else "SET=AXIS:DISTANCE, as in ymax=y:-0.4"

@@ -76,10 +76,12 @@ class SpecimenStudy:
 
         Those of fits beside the one that answers stand once with their names, and are notes: they concern a comparison.
         """
-        own = self.posteriors[self.main].warnings
-        others = merged({name: fit.warnings for name, fit in self.posteriors.items() if name != self.main}, named=True)
-        beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in others]
-        return most_severe_first([*self.data_warnings, *own, *measurement_warnings(self.experiment), *beside])
+        of_main = self.posteriors[self.main].warnings
+        of_others = merged(
+            {name: fit.warnings for name, fit in self.posteriors.items() if name != self.main}, named=True
+        )
+        beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
+        return most_severe_first([*self.data_warnings, *of_main, *measurement_warnings(self.experiment), *beside])
 
     @property
     def main(self) -> str:
@@ -207,8 +209,8 @@ def fitted(
     applicable = {
         symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in parameters]
     }
-    alone = settings.model_copy(update={"priors": applicable, "discrepancies": (discrepancy,)})
-    priors = priors_in_mpa(alone, [material], experiment)
+    applicable_settings = settings.model_copy(update={"priors": applicable, "discrepancies": (discrepancy,)})
+    priors = priors_in_mpa(applicable_settings, [material], experiment)
     return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
 
 

@@ -45,7 +45,7 @@ def study_file(tests: Sequence[Mapping[str, Any]], inspections: Sequence[Inspect
     """
     import tomli_w
 
-    parts = [HEAD]
+    blocks = [HEAD]
     for test, inspection in zip(tests, inspections, strict=True):
         remarks = [inspection.line, *(f"Note: {text}" for text in inspection.warnings)]
         named = {"name": inspection.reading.experiment.name, **test}
@@ -59,5 +59,5 @@ def study_file(tests: Sequence[Mapping[str, Any]], inspections: Sequence[Inspect
         settings = tomli_w.dumps(values) + "".join(
             f"\n[tests.{name}]\n{tomli_w.dumps(value)}" for name, value in tables.items()
         )
-        parts.append(f"[[tests]]\n{comments}{OPTIONS if test is tests[0] else ''}{settings}\n")
-    return "".join(parts)
+        blocks.append(f"[[tests]]\n{comments}{OPTIONS if test is tests[0] else ''}{settings}\n")
+    return "".join(blocks)

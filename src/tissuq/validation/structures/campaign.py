@@ -86,13 +86,13 @@ def _true_force(structure: str, truth: str) -> float:
 
 def _band(settings: StructureStudySettings, structure: str, posterior: Posterior) -> dict[str, float]:
     """Return mean, sd and 95 % band of the force at the end, N, and the error of first order in a draw."""
-    found = simulate(
+    simulation = simulate(
         posterior, STRUCTURES[structure], settings.draws, steps=settings.steps, seed=settings.seed, check_mesh=False,
         shares=False, full_runs=settings.full_runs,
     )  # fmt: skip
-    forces = found.forces[COMPLETE][:, -1]
+    forces = simulation.forces[COMPLETE][:, -1]
     band = band_of(forces[np.isfinite(forces), None])
-    error = found.first_order_error.get(COMPLETE)
+    error = simulation.first_order_error.get(COMPLETE)
     return {
         **{name: float(getattr(band, name)[0]) for name in ("mean", "sd", "low", "high")},
         "completed": int(np.isfinite(forces).sum()),
@@ -113,15 +113,17 @@ def summarise_structures(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
     names = dict.fromkeys((row["truth"], structure) for row in results for structure in row["structures"])
     for truth, structure in names:
         of_truth = [row for row in results if row["truth"] == truth]
-        found = [row["structures"][structure] for row in of_truth if structure in row["structures"]]
-        force = np.array([each["force"] for each in found])
+        estimates = [row["structures"][structure] for row in of_truth if structure in row["structures"]]
+        force = np.array([estimate["force"] for estimate in estimates])
         default, oracle = (
-            {name: np.array([each[kind][name] for each in found]) for name in ("mean", "low", "high")}
+            {name: np.array([estimate[kind][name] for estimate in estimates]) for name in ("mean", "low", "high")}
             for kind in (DEFAULT, ORACLE)
         )
-        inside, oracle_inside = ((each["low"] <= force) & (force <= each["high"]) for each in (default, oracle))
-        width, oracle_width = (each["high"] - each["low"] for each in (default, oracle))
-        count = len(found)
+        inside, oracle_inside = (
+            (estimate["low"] <= force) & (force <= estimate["high"]) for estimate in (default, oracle)
+        )
+        width, oracle_width = (estimate["high"] - estimate["low"] for estimate in (default, oracle))
+        count = len(estimates)
         share = (inside.sum() + 1) / (count + 2)  # so that the error of 0 or 100 % is not zero
         rows.append({
             "truth": truth, "structure": structure, "replicates": count, "failed": len(of_truth) - count,

@@ -93,11 +93,11 @@ class StructureStudySettings(StructureStudyOptions):
         return Tolerances(self.estimand)
 
 
-def _all_of(names: tuple[str, ...], known: Mapping[str, object], what: str) -> tuple[str, ...]:
+def _all_of(names: tuple[str, ...], available: Mapping[str, object], what: str) -> tuple[str, ...]:
     """Return names, each of which is known and given once."""
     for name in names:
-        if name not in known:
-            raise ValueError(f"there is no {what} {name!r}; choose from {', '.join(known)}")
+        if name not in available:
+            raise ValueError(f"there is no {what} {name!r}; choose from {', '.join(available)}")
     if len(set(names)) < len(names):
         raise ValueError(f"give every {what} once")
     return names
