@@ -20,7 +20,7 @@ from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning
 
-__all__ = ["Answer", "Estimate", "answer_of"]
+__all__ = ["NOTABLE_SHARE", "Answer", "Estimate", "answer_of"]
 
 NOTABLE_SHARE = 0.05
 """Of the stress, from which the discrepancy is worth a word."""

@@ -277,6 +277,9 @@ class ConditionalGaussian:
             variances = np.broadcast_to(variances, (len(h), len(block), directions))
             log_determinant[:, block] = (np.log(variances) * reduced.counts[groups]).sum(axis=2)
             precisions = 1 / variances
+            if directions == 1:
+                moments[:, block] = precisions * reduced.squares[groups, :, 0].swapaxes(0, 1)
+                continue
             for index, squares in enumerate(reduced.squares):
                 in_group = np.flatnonzero(groups == index) if len(reduced.squares) > 1 else slice(None)
                 moments[:, block[in_group]] = precisions[:, in_group] @ squares

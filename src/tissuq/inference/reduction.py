@@ -187,7 +187,7 @@ class Reducer:
         """Return the reductions at K settings (K, s) of the structure."""
         if not settings.shape[1]:
             return self._only
-        keys = [tuple(map(float, setting)) for setting in settings]
+        keys = [*map(tuple, settings.tolist())]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         self._known |= zip(new, self._at(new), strict=True)
         return Reduction.stacked([self._known[key] for key in keys])

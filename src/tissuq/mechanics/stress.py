@@ -33,7 +33,7 @@ MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 REAL_STEPS = (1e-5, 1e-6, 1e-7)
 """Steps of the stretch for difference quotients: shorter ones where an energy bends more, and rounding matters less."""
 CHECKED_ROWS = 6
-"""Of the parameter values at once, at how many the difference quotient is formed."""
+"""At about how many of many parameter values the difference quotient is formed."""
 AGREEMENT = 1e-5
 """Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""
 
@@ -182,41 +182,49 @@ def complex_step_stress(material: Material, states: States, values: FloatArray) 
     if len(states) * len(values) > MAX_COMPLEX_STEP_VALUES:
         return None
     together = max(1, VALUES_AT_ONCE // max(1, len(states)))
-    blocks = []
-    for start in range(0, max(1, len(values)), together):
-        block = _few_complex_step_stresses(material, states, values[start : start + together])
-        if block is None:
-            return None
-        blocks.append(block)
-    return np.concatenate(blocks)
-
-
-def _few_complex_step_stresses(material: Material, states: States, values: FloatArray) -> FloatArray | None:
-    moved = _moved if len(states) <= VALUES_AT_ONCE else States.moved
-
-    def energy_at(step: Any, rows: FloatArray) -> Any:
-        return material.energy_of(moved(states, step), rows.T[:, :, None])
-
+    blocks = [values[start : start + together] for start in range(0, max(1, len(values)), together)]
     try:
         with np.errstate(all="ignore"):
-            at_step = energy_at(1j * STEP, values)
-            if not isinstance(at_step, np.ndarray) or not np.iscomplexobj(at_step):
-                return None
-            slope = np.broadcast_to(at_step.imag / STEP, (len(values), len(states)))
-            indices = np.arange(len(values))
-            if np.isfinite(slope).all() and len(values) > CHECKED_ROWS:
-                indices = np.linspace(0, len(values) - 1, CHECKED_ROWS).astype(int)
-            checked, rows = slope[indices], values[indices]
-            size = np.maximum(np.abs(checked), np.abs(checked).max(axis=1, keepdims=True, initial=0.0) * 1e-2)
-            agrees = np.zeros(checked.shape, dtype=bool)
-            for step in REAL_STEPS:
-                quotient = (energy_at(step, rows) - energy_at(-step, rows)) / (2 * step)
-                agrees |= np.abs(checked - quotient) <= AGREEMENT * size + 1e-300
-                if agrees.all():
-                    return np.asarray(slope / states.loaded_axes)
+            slopes: list[FloatArray] = []
+            for block in blocks:
+                if (of_block := _complex_step_slopes(material, states, block)) is None:
+                    return None
+                slopes.append(of_block)
+            stacked = np.concatenate(slopes)
+            rows = np.arange(len(values))
+            if np.isfinite(stacked).all():
+                rows = rows[:: max(1, len(rows) // CHECKED_ROWS)]
+            checks = (rows[start : start + together] for start in range(0, len(rows), together))
+            if all(_are_slopes(material, states, values[check], stacked[check]) for check in checks):
+                return np.asarray(stacked / states.loaded_axes)
     except (TypeError, ValueError):
         pass
     return None
+
+
+def _energy_at(material: Material, states: States, step: Any, values: FloatArray) -> Any:
+    moved = _moved if len(states) <= VALUES_AT_ONCE else States.moved
+    return material.energy_of(moved(states, step), values.T[:, :, None])
+
+
+def _complex_step_slopes(material: Material, states: States, values: FloatArray) -> FloatArray | None:
+    """Return the slopes (m, n) of an energy by an imaginary step; None where the step is lost."""
+    at_step = _energy_at(material, states, 1j * STEP, values)
+    if not isinstance(at_step, np.ndarray) or not np.iscomplexobj(at_step):
+        return None
+    return np.broadcast_to(at_step.imag / STEP, (len(values), len(states)))
+
+
+def _are_slopes(material: Material, states: States, values: FloatArray, slopes: FloatArray) -> bool:
+    """Return whether slopes (m, n) are those of real difference quotients, too."""
+    size = np.maximum(np.abs(slopes), np.abs(slopes).max(axis=1, keepdims=True, initial=0.0) * 1e-2)
+    agrees = np.zeros(slopes.shape, dtype=bool)
+    for step in REAL_STEPS:
+        ends = [_energy_at(material, states, sign * step, values) for sign in (1, -1)]
+        agrees |= np.abs(slopes - (ends[0] - ends[1]) / (2 * step)) <= AGREEMENT * size + 1e-300
+        if agrees.all():
+            return True
+    return False
 
 
 @lru_cache(maxsize=32)

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
+from tissuq.assessment.answer import NOTABLE_SHARE
+from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.experiments.units import stress_unit
 from tissuq.pictures.curves import Described
 from tissuq.report.chart import chart_data
@@ -57,8 +59,8 @@ def specimen_answer(study: SpecimenStudy) -> Result:
     answer, unit = study.answer, study.unit
     return Result(
         command="fit",
-        title=f"{named(study.experiment)}: {study.settings.material} with the discrepancy '{study.main}'",
-        subject=subject_of(study.experiment),
+        title=f"{named(study.experiment)}: {study.settings.material}",
+        subject=f"{subject_of(study.experiment)} · discrepancy {study.main}",
         numbers=tuple(
             Number(name, mean / unit.to_mpa, low / unit.to_mpa, high / unit.to_mpa, unit.name)
             for name, mean, low, high in answer.estimates
@@ -205,8 +207,10 @@ def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:
     means = {name: study.posteriors[name].marginals[study.headline].mean / study.unit.to_mpa for name in _uncut(study)}
     ends = f"{significant(min(means.values()))} to {significant(max(means.values()))} {study.unit.name}"
     low, high = (end / study.unit.to_mpa for end in study.posteriors[study.main].marginals[study.headline].hdi())
-    outside = ", ".join(name for name, mean in means.items() if not low <= mean <= high)
-    remark = f"beyond the interval above: {outside}" if outside else ""
+    outside = [name for name, mean in means.items() if not low <= mean <= high]
+    shares = [abs(shares_of_discrepancy(study.posteriors[name].solution)[1][0]) for name in outside]
+    reason = " (they change the initial stiffness)" if min(shares, default=0.0) > NOTABLE_SHARE else ""
+    remark = f"beyond the interval above: {', '.join(outside)}{reason}" if outside else ""
     return (Number(f"{study.headline} with {len(means)} discrepancies", ends, remark=remark),)
 
 
