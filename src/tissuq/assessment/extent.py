@@ -82,7 +82,8 @@ class Assessment:
         Posterior probability of no discrepancy, if it is as probable as this one before the data. For information:
         intervals that drop the discrepancy for that reason miss the parameter where the noise hides a small one.
     width_against_none : float or None
-        Standard deviation of the parameter over that without discrepancy.
+        Standard deviation of the parameter over that without discrepancy; like the former None where there is none to
+        compare with, or it would have to be sampled.
     scales : tuple of str
         The parameters that set the size of the discrepancy's random part.
     shifts : dict of float to float
@@ -215,7 +216,12 @@ class Assessment:
         return text
 
 
-def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) -> Assessment:
+def assess(
+    solution: Solution,
+    solve: Solve,
+    ranges: Mapping[str, StableRange],
+    needs_sampler: Callable[[StatisticalModel], bool] = lambda model: False,
+) -> Assessment:
     """Return the effect of the discrepancy on a posterior.
 
     Parameters
@@ -226,9 +232,14 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
         with other prior scales of the discrepancy.
     ranges : mapping of str to StableRange
         Stable range by loading mode.
+    needs_sampler : callable
+        Says of a model whether ``solve`` samples it. The one without discrepancy is left out where a posterior that was
+        not sampled would have to be compared with one that is, which takes far longer than itself.
     """
     model, marginal = solution.model, solution.marginals[solution.model.headline]
-    none = _without(model, solve)
+    nothing = _without(model)
+    is_slow = solution.diagnostics is None and nothing is not None and needs_sampler(nothing)
+    none = None if nothing is None or is_slow else _solved(nothing, solve)
     share, initial_share = shares_of_discrepancy(solution)
     stiffness = modulus(solution)
     scales = scale_symbols(model)
@@ -272,15 +283,19 @@ def has_energy(model: StatisticalModel) -> bool:
     return model.discrepancy.is_energy and bool(model.discrepancy.parameters)
 
 
-def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
-    """Return the solution without discrepancy, or None where there is none already."""
+def _without(model: StatisticalModel) -> StatisticalModel | None:
+    """Return the model without discrepancy, or None where there is none already."""
     nothing = discrepancy_named("none")
     if model.discrepancy == nothing:
         return None
     retained = (*model.material_symbols, *(parameter.symbol for parameter in model.noise.parameters))
     priors = {symbol: prior for symbol, prior in model.priors.items() if symbol in retained}
+    return replace(model, discrepancy=nothing, chosen_priors=priors, fitted_errors=FittedErrors())
+
+
+def _solved(model: StatisticalModel, solve: Solve) -> Solution | None:
     try:
-        return solve([replace(model, discrepancy=nothing, chosen_priors=priors, fitted_errors=FittedErrors())])[0]
+        return solve([model])[0]
     except ModelError:  # the requested sampler has nothing to sample, or nothing is stable
         return None
 

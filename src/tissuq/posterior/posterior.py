@@ -170,8 +170,8 @@ class Posterior(PosteriorPlots):
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.
 
-        The same data are fitted without discrepancy and, unless that would need a sampler, with other prior scales of
-        what sets the discrepancy's size.
+        The same data are fitted without discrepancy and with other prior scales of what sets the discrepancy's size,
+        unless that would need a sampler, which the fit itself did without.
 
         Examples
         --------
@@ -186,7 +186,7 @@ class Posterior(PosteriorPlots):
 
     @cached_property
     def _assessment(self) -> Assessment:
-        return assess(self.solution, self.solver.solve, self.stable_ranges)
+        return assess(self.solution, self.solver.solve, self.stable_ranges, self.solver.needs_sampler)
 
     def stability(
         self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41

@@ -71,6 +71,10 @@ class Solver:
         """Return whether there is an evidence without sampling."""
         return self.method in ("auto", "exact") and (bool(model.energy_symbols) or not AdaptiveCells().why_not(model))
 
+    def needs_sampler(self, model: StatisticalModel) -> bool:
+        """Return whether there is no evidence of a model without sampling."""
+        return not self._is_integrated(model)
+
     def _sums_noise(self, model: StatisticalModel) -> bool:
         """Return whether a model is solved as a sum over values of its noise."""
         return self._is_integrated(model) and not NoiseGrid.why_not(model)
