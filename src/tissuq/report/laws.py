@@ -36,17 +36,17 @@ MODULUS = ("modulus", "modulus_low", "modulus_high")
 HOW_TO_READ = (
     "Probability: of the law with its discrepancy, were all laws as probable before the data. A law with more "
     "parameters pays for those that the data do not need. It says nothing about whether a law is true.",
-    "elpd less best: by how much the expected log density of new measurements (each left out in turn) falls short of "
+    "elpd minus best: by how much the expected log density of new measurements (each left out in turn) falls short of "
     "the best, with its standard error. Less than two errors is no difference.",
     "R2 and error alone: of the law by itself, fitted by least squares; the error is the root mean square over that "
     "of the stress. Share of discrepancy: of the stress beside this law, on average.",
-    "Stable / to 1.5 I: probability of stability over the range of I1 and I2 that was measured, and up to 1.5 times "
+    "Stable / 50 % beyond: probability of stability over the range of I1 and I2 that was measured, and up to 1.5 times "
     "these, with the discrepancy where it is an energy; in the least stable loading mode.",
     "To continue with one law: tissuq predict, export or design with this folder and --material LAW.",
 )
 HEADERS = [
-    "law", "modulus", "95 % HPD", "parameters", "probability", "elpd less best", "R2 alone", "error alone",
-    "share of discrepancy", "stable / to 1.5 I",
+    "law", "modulus", "95 % HPD", "parameters", "probability", "elpd minus best", "R2 alone", "error alone",
+    "share of discrepancy", "stable / 50 % beyond",
 ]  # fmt: skip
 
 
