@@ -13,7 +13,7 @@ import tissuq as tq
 from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
 from tissuq.assessment.next_step import STEPS, Step, _with_options
-from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, uses_of
+from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, _precision, uses_of
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.result_warning import ResultWarning, Severity
@@ -317,3 +317,13 @@ def test_the_next_step_has_the_options_of_the_warning_on_which_it_rests(warning,
     step = Step("fit again with {options}.", "act on the warning.")
     assert _with_options(step, ResultWarning(warning)).shell == f"fit again with {options}."
     assert _with_options(step, ResultWarning("torn.")).shell == step.python
+
+
+@pytest.mark.parametrize(
+    ("half_width", "verdict", "words"),
+    [(0.1, Verdict.YES, "known to ± 10 %"), (0.4, Verdict.CARE, "known to ± 40 %"),
+     (2.0, Verdict.NO, "known to no better than ± 100 %"), (30.0, Verdict.NO, "not known at all"),
+     (np.nan, Verdict.NO, "not known at all")],
+)  # fmt: skip
+def test_a_width_is_said_as_far_as_it_means_something(half_width, verdict, words):
+    assert _precision(half_width) == (verdict, words)

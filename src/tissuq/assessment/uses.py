@@ -28,6 +28,8 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
+UNKNOWN = 3.0
+"""Half width over the mean from which not even a sign or a power of ten is known."""
 NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 """Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
 SPREAD = "assumed spread between specimens"
@@ -124,12 +126,12 @@ def _reporting(
 def _precision(half_width: float) -> tuple[Verdict, str]:
     """Return a verdict on the half width of an interval over its middle, and the width in words."""
     verdict = Verdict.YES if half_width <= PRECISE else Verdict.CARE if half_width <= USEFUL else Verdict.NO
-    return verdict, f"known to {_percent(half_width)}"
+    return verdict, f"known to {_percent(half_width)}" if half_width <= UNKNOWN else _percent(half_width)
 
 
 def _percent(half_width: float) -> str:
     if not half_width <= 1:
-        return "no better than ± 100 %"
+        return "no better than ± 100 %" if half_width <= UNKNOWN else "not known at all"
     return f"± {100 * half_width:.0f} %" if half_width >= 0.1 else f"± {max(100 * half_width, 0.1):.2g} %"
 
 
@@ -159,7 +161,8 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
         return Verdict.NO, f"only {counts}"
     names = [curve.name for curve in solution.model.experiment.curves]
     worst_test = f", worst in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
-    sentence = f"stress {width} on average where it was measured{worst_test}; {counts}"
+    of_what = "of another such test " if solution.model.tolerances.estimand == TISSUE else ""
+    sentence = f"stress {of_what}{width} on average where it was measured{worst_test}; {counts}"
     for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
                          ("tests-apart", "the tests contradict each other"),
@@ -272,7 +275,7 @@ def _simulating(
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{worst.probability:.0%} of the draws are stable where measured"
+    share = f"{worst.probability:.0%} of the draws are stable within the measured strains"
     if worst.probability < MIN_STABLE:
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:

@@ -113,7 +113,7 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     if not details and (folded or record["sections"]):
         titles = ", ".join(section["title"] for section in record["sections"])
         count = f"{titles and '; '}further warnings and notes ({len(folded)})" if folded else ""
-        words = f"{titles}{count}: tissuq show {shlex.quote(str(folder))} --details"
+        words = f"More: {titles}{count}: tissuq show {shlex.quote(str(folder))} --details"
         print(fill(words, TEXT_WIDTH, subsequent_indent="  ", break_on_hyphens=False))
     print(f"Report: {folder / 'report.html'}")
 
