@@ -38,6 +38,24 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert "HYPERELASTIC, NEO HOOKE" in page
 
 
+def test_what_the_fit_says_against_finite_elements_is_said_of_the_band(cli, here, model):
+    result = here / "run" / "result.json"
+    record = json.loads(result.read_text(encoding="utf-8"))
+    record["uses"][-1] |= {"verdict": "no", "reason": "it tore"}
+    record["warnings"].append({"code": "measurements", "severity": "caution", "text": "it tore: give --until-peak."})
+    result.write_text(json.dumps(record), encoding="utf-8")
+    said = cli("ensemble", *model, "--no-figures")
+    assert said.status == 0, said.err
+    of_band = json.loads((here / "out" / "result.json").read_text(encoding="utf-8"))
+    assert of_band["uses"] == [{"purpose": "use of the fit in finite elements", "verdict": "no", "reason": "it tore"}]
+    assert of_band["next"] == f"do not use this yet, as the fit says: {record['next']}"
+    assert "it tore: give --until-peak." in [warning["text"] for warning in of_band["warnings"]]
+    result.write_text("{", encoding="utf-8")
+    said = cli("structure", "run", "--draws", 2, "--no-figures")
+    assert (said.status, "result.json' is damaged" in said.err) == (2, True)
+    assert not (here / "runs").exists()
+
+
 @pytest.mark.slow
 def test_the_next_test_is_for_a_quantity_of_the_model(cli, here, model):
     """The stub's force is C10: what a test tells of the one it tells of the other."""

@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,7 +36,9 @@ from tissuq.report.band_table import (
 )
 from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
+from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import significant
+from tissuq.result_warning import merged
 from tissuq.studies.ensemble import DRAWS, EnsembleStudy
 
 if TYPE_CHECKING:
@@ -95,6 +97,7 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
     limits = prepared.tasks(folder)[0].limits
     headers, rows = readable_quantities(study)
     count = len(prepared.ensembles)
+    said = {name: said_by(beside / run) for name, run in prepared.settings.materials.items()}
     quantity = next(iter(tables))
     return Result(
         command="ensemble",
@@ -103,13 +106,18 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
         f"{result.draws} draws completed",
         numbers=_numbers(study, tables),
         finding=_lead(study, tables),
-        next_step=_next_step(study, folder, beside),
+        uses=tuple(
+            of_run.use._replace(purpose=f"{of_run.use.purpose}, {name}" if count > 1 else of_run.use.purpose)
+            for name, of_run in said.items()
+            if of_run.use
+        ),
+        next_step=_next_step(study, said.values(), folder, beside),
         picture=Picture("answer", lambda: band_over_time(tables[quantity], quantity), f"Band of {quantity} over time",
                         f"{quantity}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
         tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
                       note=f"{_of_sector(study)} {_of_mesh(study, tables)}".strip()),),
         sections=_sections(study, tables, fields, limits, has_fields=has_fields),
-        warnings=tuple(study.warnings),
+        warnings=(*merged({name: of_run.warnings for name, of_run in said.items()}, named=count > 1), *study.warnings),
         files=_files(study, tables) | ({"fields.vtu": lambda path: write_fields(path, fields)} if has_fields else {}),
     )  # fmt: skip
 
@@ -125,11 +133,13 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
     return (*numbers, *largest_share(last_row(first_table), shares_in(first_table, is_shared=study.result.is_shared)))
 
 
-def _next_step(study: EnsembleStudy, folder: Path, beside: Path) -> str:
+def _next_step(study: EnsembleStudy, said: Iterable[Said], folder: Path, beside: Path) -> str:
     result = study.result
     if result.without_spread:
         names = ", ".join(result.without_spread)
         return f"see whether the model uses the material that was replaced: all draws give the same {names}."
+    if advice := next(filter(None, (of_run.advice for of_run in said)), ""):
+        return advice
     run, quantity = next(iter(study.prepared.settings.materials.values())), next(iter(result.curves))
     target = f"ensemble:{folder}" + f":{quantity}" * (len(result.curves) > 1)
     design = f"tissuq design {shlex.quote(os.path.normpath(beside / run))} --target {shlex.quote(target)}"

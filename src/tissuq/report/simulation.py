@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.uses import Verdict
 from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
@@ -140,8 +139,8 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
 
 
 def _next_step(simulation: Simulation, said: Said, run: str) -> str:
-    if said.use and said.use.verdict is Verdict.NO:
-        return f"do not use this yet, as the fit says: {said.next_step}"
+    if said.advice:
+        return said.advice
     is_of_tests = not simulation.ensembles[COMPLETE].origin
     if is_of_tests and (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
         return f"measure up to the strains of the body: tissuq design {run} says which test helps most"

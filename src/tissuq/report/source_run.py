@@ -44,6 +44,12 @@ class Said:
     warnings: tuple[ResultWarning, ...] = ()
     next_step: str = ""
 
+    @property
+    def advice(self) -> str:
+        """What to do before it is used in finite elements; nothing where it serves them."""
+        is_against = self.use is not None and self.use.verdict is Verdict.NO
+        return f"do not use this yet, as the fit says: {self.next_step}" if is_against else ""
+
 
 def said_by(run: Path) -> Said:
     """Return what a run folder says; nothing where there is no result in it.
@@ -67,13 +73,14 @@ def said_by(run: Path) -> Said:
 
 
 def check_source(run: Path, folder: Path) -> None:
-    """Refuse a folder that holds a simulation with another run.
+    """Refuse a folder that holds a simulation with another run, and a run whose result is damaged.
 
     Raises
     ------
     InputError
-        When it does.
+        When it does, or is.
     """
+    said_by(run)
     stored = folder / SOURCE
     if stored.is_dir() and not all(
         (run / name).is_file() and (stored / name).is_file() and filecmp.cmp(run / name, stored / name, False)
@@ -93,7 +100,7 @@ def copy_source(run: Path, folder: Path) -> None:
     if not stored.is_dir():
         scratch = folder / f"{SOURCE}.new"
         shutil.copytree(run / INPUT, scratch / INPUT, dirs_exist_ok=True)
-        for name in _files(run):
+        for name in (*_files(run), *([Path(RESULT)] if (run / RESULT).is_file() else [])):
             (scratch / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(run / name, scratch / name)
         scratch.rename(stored)
