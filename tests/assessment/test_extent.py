@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,6 +72,7 @@ def test_what_would_have_to_be_sampled_without_discrepancy_is_no_comparison_for_
     assert not any("without discrepancy" in text for text in found.sentences)
     three = StatisticalModel(data, tq.materials()["ogden-3"](), discrepancy_named("none"), noise_named("unknown"))
     assert Solver().needs_sampler(three)
+    assert Solver().needs_sampler(replace(three, noise=noise_named(0.02)))
     assert not Solver().needs_sampler(posterior.model)
 
 

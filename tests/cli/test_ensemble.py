@@ -6,9 +6,13 @@ import json
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+import tissuq as tq
+from tissuq.report.source_run import said_by
 
 from .conftest import write_specimen
 from .models import DECK, rows_of, started
@@ -42,14 +46,22 @@ def test_what_the_fit_says_against_finite_elements_is_said_of_the_band(cli, here
     result = here / "run" / "result.json"
     record = json.loads(result.read_text(encoding="utf-8"))
     record["uses"][-1] |= {"verdict": "no", "reason": "it tore"}
+    record["next"] = "see which test would make it narrower: tissuq design {run}"
     record["warnings"].append({"code": "measurements", "severity": "caution", "text": "it tore: give --until-peak."})
     result.write_text(json.dumps(record), encoding="utf-8")
     said = cli("ensemble", *model, "--no-figures")
     assert said.status == 0, said.err
     of_band = json.loads((here / "out" / "result.json").read_text(encoding="utf-8"))
     assert of_band["uses"] == [{"purpose": "use of the fit in finite elements", "verdict": "no", "reason": "it tore"}]
-    assert of_band["next"] == f"do not use this yet, as the fit says: {record['next']}"
+    next_step = "see which test would make it narrower: tissuq design run"
+    assert of_band["next"] == f"do not use this yet; next step of the fit: {next_step}"
     assert "it tore: give --until-peak." in [warning["text"] for warning in of_band["warnings"]]
+    of_other = SimpleNamespace(material=SimpleNamespace(name="yeoh"), discrepancy=SimpleNamespace(name="other"))
+    assert said_by(here / "run", of_other).use is None
+    record["uses"][-1]["verdict"] = "perhaps"
+    result.write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(tq.InputError, match="is damaged"):
+        said_by(here / "run", tq.load(here / "run").model)
     result.write_text("{", encoding="utf-8")
     said = cli("structure", "run", "--draws", 2, "--no-figures")
     assert (said.status, "result.json' is damaged" in said.err) == (2, True)

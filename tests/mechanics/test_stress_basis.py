@@ -10,8 +10,17 @@ import pytest
 import tissuq as tq
 from loading import MEASURED
 from tissuq.experiments.modes import Equibiaxial, Planar, SimpleShearNormal, Uniaxial
-from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3, StretchMaterial, stress_basis, traced_stress_basis
-from tissuq.mechanics.stress import complex_step_stress, differentiator
+from tissuq.mechanics import (
+    Material,
+    NeoHookean,
+    Ogden1,
+    Ogden2,
+    Ogden3,
+    StretchMaterial,
+    stress_basis,
+    traced_stress_basis,
+)
+from tissuq.mechanics.stress import complex_step_stress, differentiator, engineering_stress
 
 jax = differentiator()
 
@@ -111,6 +120,41 @@ def test_what_an_imaginary_step_cannot_differentiate_is_left_to_jax():
         assert complex_step_stress(WithAbsolute(), Uniaxial().at(strained), np.ones((count, 1))) is None
     expected = stress_basis(NeoHookean(), Uniaxial().at(strained)) / 2
     np.testing.assert_allclose(stress_basis(WithAbsolute(), Uniaxial().at(strained)), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 6, 7, 12, 30, 60, 101])
+def test_what_an_imaginary_step_loses_of_one_parameter_is_seen_among_many_settings(count):
+    class WithAbsolute(Material):
+        """The second term loses the imaginary part, of whichever settings."""
+
+        parameters = (
+            tq.Parameter("a", "stiffness"),
+            tq.Parameter("b", "stiffness"),
+            tq.Parameter("k", "exponent", "number", is_linear=False),
+        )
+        name = "with-absolute-term"
+        formula = "a (I1 - 3) + b |I1 - 3|^k"
+        source = "this test"
+
+        def strain_energy(self, I1, I2, values):
+            a, b, k = values
+            return a * (I1 - 3) + b * abs(I1 - 3) ** k
+
+    states = Uniaxial().at([1.2, 1.5, 1.9])
+    exponents = np.linspace(1.5, 2.5, count)[:, None]
+    together = stress_basis(WithAbsolute(), states, exponents)
+    one_by_one = [stress_basis(WithAbsolute(), states, exponent) for exponent in exponents]
+    np.testing.assert_allclose(together, one_by_one, rtol=1e-9)
+    assert (together[..., 1] > 0.05).all()
+
+
+def test_stretches_that_the_caller_changes_are_computed_anew():
+    stretch = np.linspace(1.1, 1.6, 5)
+    states = []
+    for largest in (1.6, 1.5):
+        stretch[2] = largest
+        states.append(engineering_stress(NeoHookean(), Uniaxial(), stretch, [1.0])[2])
+    assert states == pytest.approx([2 * (x - x**-2) for x in (1.6, 1.5)], rel=1e-12)
 
 
 def test_a_law_that_writes_to_the_stretches_changes_nobody_elses():

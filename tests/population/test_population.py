@@ -13,6 +13,7 @@ from scipy.stats import norm, truncnorm
 
 import tissuq as tq
 from tissuq.population.warnings import _far_specimens, far_specimens
+from tissuq.report import population
 from tissuq.report.population import _next_step
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -447,3 +448,23 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert _next_step(population, [without_unit]).startswith("say what the files do not")
     population.posteriors.pop("soft")
     assert "finite elements" in _next_step(population, [])
+
+
+def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_that_is_known(monkeypatch):
+    monkeypatch.setattr(population, "has_energy", lambda model: True)
+    monkeypatch.setattr(population, "shares_of_discrepancy", lambda share: (share, None))
+    at_rest = ResultWarning("there is stress.", "stress-at-rest")
+
+    def said(shares, warnings=()):
+        fits = {name: SimpleNamespace(solution=Share(share)) for name, share in zip("abc", shares, strict=True)}
+        law = SimpleNamespace(model=SimpleNamespace(material=SimpleNamespace(name="demiray")))
+        return population._about_law(SimpleNamespace(posteriors=fits, complete=law), warnings)
+
+    class Share(tuple):
+        model = None
+
+    clear = [(0.1, 0.0, 0.2), (0.4, 0.3, 0.5), (0.6, 0.4, 0.8)]
+    assert "demiray alone is wrong here: the discrepancy carries 40% of the stress" in said(clear)
+    assert said(clear, [at_rest]) == ""
+    assert said([(0.1, 0.0, 0.2)] * 2 + clear[2:]) == ""
+    assert said([(0.9, 0.3, 1.5)] * 2 + clear[2:]) == ""

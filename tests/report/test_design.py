@@ -80,7 +80,7 @@ def test_what_the_fit_says_of_its_measurements_comes_before_a_further_test(study
     )  # fmt: skip
     write_result(said, tmp_path, figures=False)
     result = design_result(study, study.settings, tmp_path)
-    assert result.next_step.startswith("see to the first warning below first")
+    assert result.next_step.startswith("see first to the warning about the fit")
     assert [warning for warning in result.warnings if "tore" in warning or "few" in warning] == ["it tore."]
 
 

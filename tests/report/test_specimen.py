@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.report import population
+from tissuq.report import specimen
 from tissuq.report.methods import methods_section
 from tissuq.report.result import Table
 from tissuq.report.specimen import _of_what, specimen_answer, specimen_result
@@ -33,8 +33,8 @@ def test_the_numbers_are_those_of_the_answer_in_the_unit_of_the_file(result, spe
     assert (low, high) == pytest.approx((min(means.values()), max(means.values())), rel=0.02)
     low, high = (1e3 * end for end in specimen_study.posteriors["auto"].marginals["C10"].hdi())
     outside = [name for name, mean in means.items() if not low <= mean <= high]
-    assert bool(over_discrepancies.remark) == bool(outside)
-    assert all(name in over_discrepancies.remark for name in outside)
+    assert outside == []
+    assert over_discrepancies.remark == ""
     assert specimen_study.posteriors["auto"].model.meaning in result.finding
 
 
@@ -122,17 +122,15 @@ def test_intervals_that_are_not_of_the_same_are_said_to_be_so():
     assert _of_what(SimpleNamespace(posteriors={"none": fits["none"]})) == ""
 
 
-def test_a_population_says_how_far_the_law_alone_is_from_its_specimens(monkeypatch):
-    solutions = {
-        name: SimpleNamespace(model=None, share=share) for name, share in zip("abc", (0.1, 0.4, 0.6), strict=True)
-    }
-    monkeypatch.setattr(population, "has_energy", lambda model: True)
-    monkeypatch.setattr(population, "shares_of_discrepancy", lambda solution: ((solution.share, 0.0, 1.0), None))
-    material = SimpleNamespace(material=SimpleNamespace(name="demiray"))
-    pooled = SimpleNamespace(
-        posteriors={name: SimpleNamespace(solution=solution) for name, solution in solutions.items()},
-        complete=SimpleNamespace(model=material),
-    )
-    assert "demiray alone is wrong here: the discrepancy carries 40% of the stress" in population._about_law(pooled)
-    solutions["b"].share = 0.15
-    assert population._about_law(pooled) == ""
+def test_discrepancies_beyond_the_interval_of_the_answer_are_named_with_what_they_change(specimen_study, monkeypatch):
+    modulus = specimen_study.posteriors["auto"].marginals["C10"]
+    low, high = modulus.hdi()
+    means = {"auto": modulus.mean, "near": 0.9 * high + 0.1 * low, "above": 1.1 * high, "below": 0.9 * low}
+    monkeypatch.setattr(specimen, "shares_of_discrepancy", lambda solution: (None, (solution, 0.0, 0.0)))
+    for changes, reason in ((-0.2, " (they change the initial stiffness)"), (0.01, "")):
+        fits = {name: SimpleNamespace(marginals={"C10": SimpleNamespace(mean=mean, hdi=modulus.hdi)}, solution=share)
+                for (name, mean), share in zip(means.items(), (0.0, 0.0, 0.3, changes), strict=True)}  # fmt: skip
+        study = SimpleNamespace(posteriors=fits, main="auto", headline="C10", unit=specimen_study.unit,
+                                is_cut_by_prior=lambda name: False)  # fmt: skip
+        (number,) = specimen._over_discrepancies(study)
+        assert number.remark == f"beyond the interval above: above, below{reason}"

@@ -220,7 +220,7 @@ def assess(
     solution: Solution,
     solve: Solve,
     ranges: Mapping[str, StableRange],
-    needs_sampler: Callable[[StatisticalModel], bool] = lambda model: False,
+    needs_sampler: Callable[[StatisticalModel], bool],
 ) -> Assessment:
     """Return the effect of the discrepancy on a posterior.
 

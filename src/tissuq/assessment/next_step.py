@@ -84,7 +84,7 @@ STEPS_OF_WARNINGS: Mapping[str, str] = {
     "slack": "slack",
 }
 """Step for a caution of each code: before further tests, for the severest that has one."""
-ONLY_IN_DOUBT = {"measurements": Verdict.CARE, "slack": Verdict.CARE, "few-measurements": Verdict.NO}
+ONLY_IN_DOUBT = {"slack": Verdict.CARE, "few-measurements": Verdict.NO}
 """Of some, the best verdict on the modulus at which they are the next step."""
 
 

@@ -162,7 +162,8 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
     names = [curve.name for curve in solution.model.experiment.curves]
     worst_test = f", worst in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
     of_what = "of another such test " if solution.model.tolerances.estimand == TISSUE else ""
-    sentence = f"stress {of_what}{width} on average where it was measured{worst_test}; {counts}"
+    where = " on average where it was measured" if max(widths) <= UNKNOWN else ""
+    sentence = f"stress {of_what}{width}{where}{worst_test}; {counts}"
     for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
                          ("tests-apart", "the tests contradict each other"),

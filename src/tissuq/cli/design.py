@@ -26,6 +26,7 @@ class DesignOptions(OfRun):
 def design(call: Call[DesignSettings, DesignOptions]) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
     from tissuq.report.design import design_result
+    from tissuq.report.source_run import said_by
     from tissuq.studies.design import run_design
     from tissuq.studies.ensemble_target import with_folder
 
@@ -43,6 +44,7 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     targets = tuple(with_folder(name, from_target) for name in settings.targets)
     recipe = settings.model_copy(update={"run": from_target(settings.run), "targets": targets})
 
+    said_by(run)  # refused before the ranking where it is damaged
     call.carried_out(
         target,
         lambda step: run_design(settings, call.beside, step, call.law),

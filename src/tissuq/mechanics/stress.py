@@ -32,8 +32,8 @@ MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 """Number of stresses from which compiling their derivatives takes less time, and of those that are computed at once."""
 REAL_STEPS = (1e-5, 1e-6, 1e-7)
 """Steps of the stretch for difference quotients: shorter ones where an energy bends more, and rounding matters less."""
-CHECKED_ROWS = 6
-"""At about how many of many parameter values the difference quotient is formed."""
+CHECKED_PLACES = 5
+"""Of many parameter values, at how many places some are taken, of which the difference quotient is formed."""
 AGREEMENT = 1e-5
 """Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""
 
@@ -192,8 +192,10 @@ def complex_step_stress(material: Material, states: States, values: FloatArray) 
                 slopes.append(of_block)
             stacked = np.concatenate(slopes)
             rows = np.arange(len(values))
-            if np.isfinite(stacked).all():
-                rows = rows[:: max(1, len(rows) // CHECKED_ROWS)]
+            columns = values.shape[1]  # of a basis at most, whose rows follow one another: all of them are checked
+            if np.isfinite(stacked).all() and len(rows) > CHECKED_PLACES * columns:
+                starts = np.linspace(0, len(rows) - columns, CHECKED_PLACES).astype(int)
+                rows = np.unique(starts[:, None] + np.arange(columns))
             checks = (rows[start : start + together] for start in range(0, len(rows), together))
             if all(_are_slopes(material, states, values[check], stacked[check]) for check in checks):
                 return np.asarray(stacked / states.loaded_axes)

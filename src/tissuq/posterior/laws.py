@@ -83,10 +83,8 @@ class LawFit:
             best_fit = least_squares(data, law, posterior.model.priors)
         modulus = posterior.initial_shear_modulus
         row = _row(posterior, modulus, best_fit) | {"seconds": seconds}
-        _ = (
-            posterior.left_out,
-            posterior.warnings,
-        )  # which every comparison asks for, while laws are fitted side by side
+        # What every comparison asks for, computed while laws are fitted side by side.
+        _ = posterior.left_out, posterior.warnings
         return cls(posterior, best_fit, modulus, row)
 
 
@@ -326,10 +324,15 @@ def fit_laws(
     if pool is not None:  # the laws of most parameters, which take longest, begin
         futures = {name: pool.submit(tasks[name]) for name in reversed(tasks)}
         step(f"0 of {len(futures)} laws")
+    has_some = False
     for done, future in enumerate(as_completed(futures.values()), 1):
         step(f"{done} of {len(futures)} laws")
-        if not is_all and future.exception():
-            break
+        failure = future.exception()
+        has_some |= failure is None
+        if failure is not None and (not is_all or (not has_some and isinstance(failure, InputError))):
+            for waiting in futures.values():
+                waiting.cancel()
+            raise failure
     fits = dict[str, LawFit]()
     for number, (name, task) in enumerate(tasks.items(), 1):
         if not futures:
@@ -338,8 +341,6 @@ def fit_laws(
             fits[name] = futures[name].result() if futures else task()
         except (ConvergenceError, ModelError, InputError) as error:
             if not is_all or (not fits and isinstance(error, InputError)):
-                for future in futures.values():
-                    future.cancel()
                 raise
             skipped[name] = str(error)
     if not fits:

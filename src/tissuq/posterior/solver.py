@@ -72,8 +72,9 @@ class Solver:
         return self.method in ("auto", "exact") and (bool(model.energy_symbols) or not AdaptiveCells().why_not(model))
 
     def needs_sampler(self, model: StatisticalModel) -> bool:
-        """Return whether there is no evidence of a model without sampling."""
-        return not self._is_integrated(model)
+        """Return whether a model is sampled."""
+        is_slow = self.method == "auto" and not model.energy_symbols and bool(_why_not_soon(model))
+        return is_slow or not self._is_integrated(model)
 
     def _sums_noise(self, model: StatisticalModel) -> bool:
         """Return whether a model is solved as a sum over values of its noise."""

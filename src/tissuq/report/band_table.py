@@ -38,6 +38,8 @@ SHARES = {
     "noise": BASE,
 }  # fmt: skip
 """Colours of what a variance is due to."""
+SIGNIFICANT_ERRORS = 2.0
+"""Standard errors by which a share is above the whole before that is said."""
 LABELS = {name: name for name in SHARES} | {"test_scale": "scale of tests"}
 OF_SOURCES = (
     "What draws differ by independently of these is taken out first: **extrapolation**, how they go on beyond the "
@@ -113,7 +115,7 @@ def largest_share(row: Mapping[str, Any], names: Collection[str], of: str = "the
         return []
     largest = max(known, key=lambda name: float(row[name]))
     remark = f"{share_cell(row, largest)} of {of}"
-    if row[largest] > 1:
+    if row[largest] - SIGNIFICANT_ERRORS * row[f"{largest}_error"] > 1:
         remark = "part of which another source takes back: what they do together is the band"
     return [Number("uncertain mostly by", LABELS[largest], remark=remark)]
 

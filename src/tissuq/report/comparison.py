@@ -109,7 +109,7 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
         difference, error = -table["elpd_difference"], table["elpd_difference_error"]
         _differences(prediction, levels, difference, difference - error, difference + error)
         prediction.set_title("Prediction")
-        prediction.set_xlabel("elpd less that of the best\n(line: ± standard error)")
+        prediction.set_xlabel("elpd minus that of the best\n(line: ± standard error)")
         prediction.text(1.02, 1.0, "stacking,\nfor predictions only", transform=prediction.transAxes, fontsize=8.5,
                         ha="left", va="bottom", color="#5a6472")  # fmt: skip
         marks = np.where(table["is_rough"], " (rough)", "")

@@ -39,7 +39,7 @@ CAPTION = (
     "Expected standard deviation after each test, the best on top. Lines reach from it to the standard deviation now; "
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
 )
-AFTER_WARNING = "see to the first warning below first, as the ranking takes the measurements for right. Then"
+AFTER_WARNING = "see first to the warning about the fit, whose measurements the ranking takes for right. Then"
 NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{options}"
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")

@@ -97,7 +97,9 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
     limits = prepared.tasks(folder)[0].limits
     headers, rows = readable_quantities(study)
     count = len(prepared.ensembles)
-    said = {name: said_by(beside / run) for name, run in prepared.settings.materials.items()}
+    said = {
+        name: said_by(beside / run, prepared.ensembles[name].model) for name, run in prepared.settings.materials.items()
+    }
     quantity = next(iter(tables))
     return Result(
         command="ensemble",
@@ -138,8 +140,6 @@ def _next_step(study: EnsembleStudy, said: Iterable[Said], folder: Path, beside:
     if result.without_spread:
         names = ", ".join(result.without_spread)
         return f"see whether the model uses the material that was replaced: all draws give the same {names}."
-    if advice := next(filter(None, (of_run.advice for of_run in said)), ""):
-        return advice
     run, quantity = next(iter(study.prepared.settings.materials.values())), next(iter(result.curves))
     target = f"ensemble:{folder}" + f":{quantity}" * (len(result.curves) > 1)
     design = f"tissuq design {shlex.quote(os.path.normpath(beside / run))} --target {shlex.quote(target)}"
@@ -148,6 +148,8 @@ def _next_step(study: EnsembleStudy, said: Iterable[Said], folder: Path, beside:
             "look at why draws failed, below. To make them again, where the solver was at fault, repeat the command "
             "with --again; a model with other increments or another mesh needs another --out."
         )
+    if advice := next(filter(None, (of_run.advice for of_run in said)), ""):
+        return advice
     if next(iter(study.prepared.ensembles.values())).origin:  # no test of the material was fitted that another adds to
         return "compare the band with a measurement of your own, if there is one."
     share_beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))

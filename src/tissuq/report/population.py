@@ -134,7 +134,7 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
-    if any(isinstance(warning, ResultWarning) and warning.code == "doubtful-reading" for warning in warnings):
+    if _has(warnings, "doubtful-reading"):
         return "say what the files do not, as the warning about what was read asks, and fit again"
     if far := list(far_specimens(population)):
         options = " ".join(f"--without {name}" for name in (*already_without, *far))
@@ -143,6 +143,11 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
     return "take a new specimen into finite elements: tissuq export, structure or ensemble {run}"
+
+
+def _has(warnings: Sequence[str], code: str) -> bool:
+    """Return whether some warning has a code."""
+    return any(isinstance(warning, ResultWarning) and warning.code == code for warning in warnings)
 
 
 def _note(population: Population) -> str:
@@ -358,18 +363,23 @@ def _lead(study: PopulationStudy) -> str:
     return (
         f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
-        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}{_about_law(study.population)}"
-    )
+        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
+    ) + _about_law(study.population, study.warnings)
 
 
-def _about_law(population: Population) -> str:
-    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
-    solutions = [posterior.solution for posterior in population.posteriors.values()]
-    shares = [shares_of_discrepancy(solution)[0][0] for solution in solutions if has_energy(solution.model)]
-    if not shares or (share := float(np.median(shares))) <= PRECISE:
+def _about_law(population: Population, warnings: Sequence[str]) -> str:
+    """Return how far the law alone is from the measurements, as a sentence after others.
+
+    Nothing where it is near, where there is stress at rest, or where that is not known of most specimens.
+    """
+    solutions = [fit.solution for fit in population.posteriors.values() if has_energy(fit.solution.model)]
+    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
+    known = [share for share, _, high in shares if high < 1]
+    is_clear = 2 * len(known) > len(population.posteriors) and not _has(warnings, "stress-at-rest")
+    if not is_clear or (share := float(np.median(known))) <= PRECISE:
         return ""
-    law, carried = population.complete.model.material.name, f"{share:.0%}" if share < 1 else "more than 100 %"
+    law = population.complete.model.material.name
     return (
-        f" {law} alone is wrong here: the discrepancy carries {carried} of the stress "
+        f" {law} alone is wrong here: the discrepancy carries {share:.0%} of the stress "
         "(median of the specimens). Use it with the discrepancy, as exports do, or fit another law."
     )

@@ -66,7 +66,7 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
     table = simulation.table()
     (folder / "failures.csv").unlink(missing_ok=True)
     failures = [vars(failure) for failure in simulation.failures]
-    case, said = simulation.case, said_by(run)
+    case, said = simulation.case, said_by(run, model)
     headers, rows = readable_forces(study)
     percent = percent_of(table["draws"].max())
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import filecmp
+import os
+import shlex
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +13,13 @@ from tissuq.assessment.uses import Use, Verdict
 from tissuq.errors import InputError
 from tissuq.finite_elements.body_from_file import BodyFromFile
 from tissuq.finite_elements.case import Case
+from tissuq.model.statistical_model import StatisticalModel
 from tissuq.report.result import RESULT
 from tissuq.report.run_folder import INPUT, RECIPE
 from tissuq.report.writer import read_record
 from tissuq.result_warning import ResultWarning, Severity
-from tissuq.studies.earlier_run import POSTERIORS
+from tissuq.studies.earlier_run import POSTERIORS, answering
+from tissuq.studies.settings import damage_reported
 
 __all__ = ["SOURCE", "Said", "check_mesh", "check_source", "copy_mesh", "copy_source", "said_by", "stored_mesh"]
 
@@ -47,12 +51,15 @@ class Said:
     @property
     def advice(self) -> str:
         """What to do before it is used in finite elements; nothing where it serves them."""
-        is_against = self.use is not None and self.use.verdict is Verdict.NO
-        return f"do not use this yet, as the fit says: {self.next_step}" if is_against else ""
+        if self.use is None or self.use.verdict is not Verdict.NO:
+            return ""
+        return "do not use this yet" + (f"; next step of the fit: {self.next_step}" if self.next_step else "")
 
 
-def said_by(run: Path) -> Said:
+def said_by(run: Path, model: StatisticalModel | None = None) -> Said:
     """Return what a run folder says; nothing where there is no result in it.
+
+    Of another model than that of its answer, as one of several discrepancies or laws is, it says no use.
 
     Raises
     ------
@@ -62,14 +69,28 @@ def said_by(run: Path) -> Said:
     if not (run / RESULT).is_file():
         return Said()
     record = read_record(run)
-    uses = [use for use in record["uses"] if use["purpose"].startswith(SIMULATING)]
-    warnings = [
-        ResultWarning(warning["text"], warning["code"], Severity(warning["severity"]))
-        for warning in record["warnings"]
-        if warning["code"] in SPOILING and warning["severity"] != Severity.NOTE
-    ]
-    use = Use(USE_OF_FIT, Verdict(uses[0]["verdict"]), uses[0]["reason"]) if uses else None
-    return Said(use, tuple(warnings), record["next"])
+    with damage_reported(run / RESULT):
+        warnings = [
+            ResultWarning(warning["text"], warning["code"], Severity(warning["severity"]))
+            for warning in record["warnings"]
+            if warning["code"] in SPOILING and warning["severity"] != Severity.NOTE
+        ]
+        uses = [
+            Use(USE_OF_FIT, Verdict(use["verdict"]), use["reason"])
+            for use in record["uses"]
+            if model is not None and use["purpose"] in _purposes_of(run, model)
+        ]
+    folder = shlex.quote(os.path.normpath(run))
+    return Said(uses[0] if uses else None, tuple(warnings), record["next"].replace("{run}", folder))
+
+
+def _purposes_of(run: Path, model: StatisticalModel) -> set[str]:
+    """Return what a run calls the use of a model in finite elements, in an answer or in a comparison of laws."""
+    with_law = f"{SIMULATING}, with {model.material.name}"
+    try:
+        return {with_law} | ({SIMULATING} if answering(run) == model.discrepancy.name else set())
+    except InputError:  # no run of tissuq fit
+        return {with_law}
 
 
 def check_source(run: Path, folder: Path) -> None:
@@ -100,7 +121,8 @@ def copy_source(run: Path, folder: Path) -> None:
     if not stored.is_dir():
         scratch = folder / f"{SOURCE}.new"
         shutil.copytree(run / INPUT, scratch / INPUT, dirs_exist_ok=True)
-        for name in (*_files(run), *([Path(RESULT)] if (run / RESULT).is_file() else [])):
+        names = _files(run) + [Path(RESULT)] * (run / RESULT).is_file()
+        for name in names:
             (scratch / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(run / name, scratch / name)
         scratch.rename(stored)

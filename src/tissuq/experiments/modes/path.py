@@ -71,7 +71,7 @@ class Path(ABC):
 
     def at(self, points: Any, curve: int = UNMEASURED) -> States:
         """Return the states at points of this path, which are those of a measured curve where its number is given."""
-        return States((self,), (np.asarray(points, dtype=np.float64),), (curve,))
+        return States((self,), (np.array(points, dtype=np.float64),), (curve,))  # a copy, as what is computed is kept
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,6 +115,8 @@ def _cycles(reading: Reading, number: int) -> str:
 
 def _change_of_peaks(reading: Reading, number: int) -> str:
     """Return by how much the stress at the peaks of equal cycles changes, as a clause; nothing where it hardly does."""
+    if DISTURBED.intersection(region.kind for region in reading.regions[number]):
+        return ""
     peaks = [cycle.peak for cycle in reading.used_cycles]
     reached, stress = reading.used.course[peaks], reading.used.stress[number][peaks]
     largest = float(np.abs(reading.used.stress[number]).max())
