@@ -127,6 +127,15 @@ def test_show_prints_the_study(cli, paper_run):
     assert shown.out.split("The question")[0] == said.out.split("The question")[0]
 
 
+def test_advice_that_names_options_says_that_they_are_those_of_a_fit(paper_run):
+    folder, _ = paper_run
+    warnings = json.loads((folder / "result.json").read_text(encoding="utf-8"))["warnings"]
+    with_options = [warning["text"] for warning in warnings if "--" in warning["text"]]
+    assert with_options
+    assert all("Options are those of tissuq fit" in text for text in with_options)
+    assert {warning["severity"] for warning in warnings} == {"note"}
+
+
 @pytest.mark.slow
 def test_a_run_is_repeated_byte_for_byte_from_its_run_toml(whole_paper_run, tmp_path):
     folder, _ = whole_paper_run

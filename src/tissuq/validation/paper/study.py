@@ -100,6 +100,8 @@ class PaperSettings(PaperOptions):
 
 RANGES = ((0.5, 4.25), (0.5, 3.0), (0.6, 2.0), (1.0, 4.25))
 AMPLITUDE_BOUNDS = (1.0, 10.0)
+OF_A_FIT = " (Options are those of tissuq fit; this study is as the paper has it.)"
+"""Behind advice that names some."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +189,7 @@ class PaperStudy:
         """
         sampled = {f"{name} (nuts)": fit for name, fit in self.sampled.items()}
         texts = merged({name: fit.posterior.warnings for name, fit in {**self.main, **sampled}.items()})
+        texts = [text.with_end(OF_A_FIT) if "--" in text.shell else text for text in texts]
         return [text if text.severity is Severity.PROBLEM else text.as_note() for text in texts]
 
     @property
