@@ -17,6 +17,7 @@ from tissuq.experiments.reading.load_cell import scatter_of_neighbours
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
+from tissuq.experiments.reading.slack import Slack, find_slack
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
@@ -210,12 +211,28 @@ def _stress_at_rest(reading: Reading, number: int) -> str:
     sign = np.sign(at_reference)
     if min(sign * at_reference, sign * at_rest) <= max(NOTABLE_SHARE * largest, ERRORS_OF_ZERO * standard_error):
         return ""
-    zero = _load_zero(reading, number, nearest, at_rest / at_reference)
+    options = f"--load-zero {_load_zero(reading, number, nearest, at_rest / at_reference)}"
+    beside = ""
+    if slack := _slack_without(reading, number, at_rest):
+        options += " --preload auto"
+        beside = (
+            f", and slack: without it the first {slack.rows} rows carry no load that shows, up to {control.name} "
+            f"{slack.stretch:.4g}"
+        )
     return (
         f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
-        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which --load-zero "
-        f"{zero} takes off. A hyperelastic material has no stress at {control.name} {control.reference:g}."
+        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which {options} "
+        f"takes off{beside}. A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
+
+
+def _slack_without(reading: Reading, number: int, at_rest: float) -> Slack | None:
+    """Return the slack of a test that is stretched once, if its stress at rest is taken off; None where none shows."""
+    if len(reading.used_cycles) > 1 or reading.used.stretch[number].min() < 1:
+        return None
+    stretch, stress = reading.used.stretch[number], reading.used.stress[number] - at_rest
+    loading = slice(int(np.argmax(np.abs(stress))) + 1)
+    return find_slack(stretch[loading], stress[loading])
 
 
 def _load_zero(reading: Reading, number: int, row: int, share: float) -> str:
