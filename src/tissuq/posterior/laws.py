@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
-from contextlib import suppress
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from contextlib import closing, suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -320,33 +320,41 @@ def fit_laws(
         foreign_symbols = symbols - {parameter.symbol for parameter in law.parameters}
         chosen_priors = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in foreign_symbols}
         tasks[name] = partial(LawFit.of, data, law, chosen_priors, options)
-    futures = dict[str, Future[LawFit]]()
-    if pool is not None:  # the laws of most parameters, which take longest, begin
-        futures = {name: pool.submit(tasks[name]) for name in reversed(tasks)}
-        step(f"0 of {len(futures)} laws")
-    has_some = False
-    for done, future in enumerate(as_completed(futures.values()), 1):
-        step(f"{done} of {len(futures)} laws")
-        failure = future.exception()
-        has_some |= failure is None
-        if failure is not None and (not is_all or (not has_some and isinstance(failure, InputError))):
-            for waiting in futures.values():
-                waiting.cancel()
-            raise failure
     fits = dict[str, LawFit]()
-    for number, (name, task) in enumerate(tasks.items(), 1):
-        if not futures:
-            step(f"law {number} of {len(tasks)}: {name}")
-        try:
-            fits[name] = futures[name].result() if futures else task()
-        except (ConvergenceError, ModelError, InputError) as error:
-            if not is_all or (not fits and isinstance(error, InputError)):
-                raise
-            skipped[name] = str(error)
+    with closing(_carried_out(tasks, step, pool)) as results:
+        for name, result in results:
+            try:
+                fits[name] = result()
+            except (ConvergenceError, ModelError, InputError) as error:
+                if not is_all or (not fits and isinstance(error, InputError)):
+                    raise
+                skipped[name] = str(error)
+    fits = {name: fits[name] for name in tasks if name in fits}
+    skipped = {name: skipped[name] for name in tasks if name in skipped}
     if not fits:
         name, reason = next(iter(skipped.items()))
         raise ModelError(f"no law can be fitted, not even '{name}': {reason}")
     return LawComparison(fits, skipped)
+
+
+def _carried_out(
+    tasks: dict[str, Callable[[], LawFit]], step: Callable[[str], None], pool: Executor | None
+) -> Generator[tuple[str, Callable[[], LawFit]]]:
+    """Yield what gives the fit of every law or raises why there is none, in a pool those first that are done."""
+    if pool is None:
+        for number, (name, task) in enumerate(tasks.items(), 1):
+            step(f"law {number} of {len(tasks)}: {name}")
+            yield name, task
+        return
+    names = {pool.submit(tasks[name]): name for name in reversed(tasks)}  # those of most parameters take longest
+    step(f"0 of {len(names)} laws")
+    try:
+        for done, future in enumerate(as_completed(names), 1):
+            step(f"{done} of {len(names)} laws")
+            yield names[future], future.result
+    finally:
+        for future in names:
+            future.cancel()
 
 
 def _row(posterior: Posterior, modulus: Marginal, best_fit: LeastSquares | None) -> dict[str, Any]:

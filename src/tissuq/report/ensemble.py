@@ -21,6 +21,7 @@ from tissuq.decks.quantity import Component
 from tissuq.decks.solver import CalculiXSolver
 from tissuq.experiments.units import stress_unit
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
+from tissuq.report.answer_of_run import Said, said_by
 from tissuq.report.band_table import (
     LABELS,
     band_cells,
@@ -36,7 +37,6 @@ from tissuq.report.band_table import (
 )
 from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
-from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import significant
 from tissuq.result_warning import merged
 from tissuq.studies.ensemble import DRAWS, EnsembleStudy

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.uses import Use, Verdict
+from tissuq.assessment.uses import Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
+from tissuq.report.answer_of_run import uses_of
 from tissuq.report.measured import named
 from tissuq.report.prediction_tables import (
     MAX_ROWS,
@@ -31,9 +32,7 @@ from tissuq.report.prediction_tables import (
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.stability import SAME_STATES
-from tissuq.report.writer import read_record
 from tissuq.result_warning import in_shell
-from tissuq.studies.earlier_run import answering
 from tissuq.studies.prediction import Prediction, draw_prediction
 
 if TYPE_CHECKING:
@@ -127,13 +126,12 @@ def prediction_result(
 def _use_of_mode(prediction: Prediction, run: Path) -> tuple[Use, ...]:
     """Return whether this mode can be predicted, as the answer of the run says; nothing where it is not known."""
     try:
-        is_of_prediction = answering(run) == prediction.posterior.model.discrepancy.name
-        uses = [Use(use["purpose"], Verdict(use["verdict"]), use["reason"]) for use in read_record(run)["uses"]]
-    except (InputError, ValueError):
+        uses = uses_of(run, prediction.posterior.model)
+    except InputError:
         return ()
     is_measured = prediction.mode in prediction.posterior.model.experiment.modes
     purpose = "predict these tests" if is_measured else "predict other loading modes"
-    return tuple(use for use in uses if is_of_prediction and use.purpose == purpose)
+    return tuple(use for use in uses if use.purpose == purpose)
 
 
 def _stresses_at_the_end(prediction: Prediction) -> list[Number]:

@@ -14,6 +14,7 @@ from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
+from tissuq.report.answer_of_run import Said, said_by
 from tissuq.report.band_table import (
     LABELS,
     SHARES,
@@ -39,7 +40,6 @@ from tissuq.report.simulation_figures import (
     write_collection,
     write_vtu,
 )
-from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import known_number, significant
 from tissuq.studies.structure import SimulationStudy
 

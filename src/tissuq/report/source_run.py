@@ -1,96 +1,23 @@
-"""The run that a posterior comes from: copies of its files where it was used, and what it says against that use."""
+"""Copies of the files of a run that a posterior comes from, in the folder of what was computed with it."""
 
 from __future__ import annotations
 
 import filecmp
-import os
-import shlex
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
-from tissuq.assessment.uses import Use, Verdict
 from tissuq.errors import InputError
 from tissuq.finite_elements.body_from_file import BodyFromFile
 from tissuq.finite_elements.case import Case
-from tissuq.model.statistical_model import StatisticalModel
+from tissuq.report.answer_of_run import said_by
 from tissuq.report.result import RESULT
 from tissuq.report.run_folder import INPUT, RECIPE
-from tissuq.report.writer import read_record
-from tissuq.result_warning import ResultWarning, Severity
-from tissuq.studies.earlier_run import POSTERIORS, answering
-from tissuq.studies.settings import damage_reported
+from tissuq.studies.earlier_run import POSTERIORS
 
-__all__ = ["SOURCE", "Said", "check_mesh", "check_source", "copy_mesh", "copy_source", "said_by", "stored_mesh"]
+__all__ = ["SOURCE", "check_mesh", "check_source", "copy_mesh", "copy_source", "stored_mesh"]
 
 SOURCE = "source"
 """The folder with the copies."""
-SPOILING = ("not-converged", "doubtful-reading", "stress-at-rest", "tests-apart", "contradicting-tests",
-            "unmodelled-curve", "measurements")  # fmt: skip
-"""Codes of warnings about what a fit says of the tissue, and not about how exactly."""
-SIMULATING, USE_OF_FIT = "simulate with finite elements", "use of the fit in finite elements"
-
-
-@dataclass(frozen=True)
-class Said:
-    """What a fit says to whatever is computed with it.
-
-    Attributes
-    ----------
-    use : Use or None
-        Whether it serves finite elements; None where it says nothing, as a population does.
-    warnings : tuple of ResultWarning
-        Those that hold for it, too.
-    next_step : str
-    """
-
-    use: Use | None = None
-    warnings: tuple[ResultWarning, ...] = ()
-    next_step: str = ""
-
-    @property
-    def advice(self) -> str:
-        """What to do before it is used in finite elements; nothing where it serves them."""
-        if self.use is None or self.use.verdict is not Verdict.NO:
-            return ""
-        return "do not use this yet" + (f"; next step of the fit: {self.next_step}" if self.next_step else "")
-
-
-def said_by(run: Path, model: StatisticalModel | None = None) -> Said:
-    """Return what a run folder says; nothing where there is no result in it.
-
-    Of another model than that of its answer, as one of several discrepancies or laws is, it says no use.
-
-    Raises
-    ------
-    InputError
-        When its result is damaged.
-    """
-    if not (run / RESULT).is_file():
-        return Said()
-    record = read_record(run)
-    with damage_reported(run / RESULT):
-        warnings = [
-            ResultWarning(warning["text"], warning["code"], Severity(warning["severity"]))
-            for warning in record["warnings"]
-            if warning["code"] in SPOILING and warning["severity"] != Severity.NOTE
-        ]
-        uses = [
-            Use(USE_OF_FIT, Verdict(use["verdict"]), use["reason"])
-            for use in record["uses"]
-            if model is not None and use["purpose"] in _purposes_of(run, model)
-        ]
-    folder = shlex.quote(os.path.normpath(run))
-    return Said(uses[0] if uses else None, tuple(warnings), record["next"].replace("{run}", folder))
-
-
-def _purposes_of(run: Path, model: StatisticalModel) -> set[str]:
-    """Return what a run calls the use of a model in finite elements, in an answer or in a comparison of laws."""
-    with_law = f"{SIMULATING}, with {model.material.name}"
-    try:
-        return {with_law} | ({SIMULATING} if answering(run) == model.discrepancy.name else set())
-    except InputError:  # no run of tissuq fit
-        return {with_law}
 
 
 def check_source(run: Path, folder: Path) -> None:

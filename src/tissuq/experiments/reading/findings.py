@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -17,7 +18,7 @@ from tissuq.experiments.reading.load_cell import scatter_of_neighbours
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
-from tissuq.experiments.reading.slack import Slack, find_slack
+from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
@@ -230,9 +231,8 @@ def _slack_without(reading: Reading, number: int, at_rest: float) -> Slack | Non
     """Return the slack of a test that is stretched once, if its stress at rest is taken off; None where none shows."""
     if len(reading.used_cycles) > 1 or reading.used.stretch[number].min() < 1:
         return None
-    stretch, stress = reading.used.stretch[number], reading.used.stress[number] - at_rest
-    loading = slice(int(np.argmax(np.abs(stress))) + 1)
-    return find_slack(stretch[loading], stress[loading])
+    tested = reading.tested[number]
+    return replace(tested, used=replace(tested.used, stress=tested.used.stress - at_rest)).slack
 
 
 def _load_zero(reading: Reading, number: int, row: int, share: float) -> str:
