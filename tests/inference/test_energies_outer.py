@@ -152,6 +152,26 @@ def test_a_narrow_and_skewed_density_is_found():
     assert np.exp(log_weights).mean() == pytest.approx(2 * np.pi * 0.02 * 0.05, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("x_0", "sd", "width", "count", "min_effective"),
+    [(-2.2, 0.05, 0.01, 96, 20.0), (-2.0, 0.05, 0.005, 64, 20.0), (2.2, 0.05, 0.01, 96, 6.0)],
+)
+def test_the_end_of_a_long_ridge_is_found(x_0, sd, width, count, min_effective):
+    """Of a normalised density at the end of a ridge, on which many points are effective among those that lie lower.
+
+    Or to which no fifteen rounds lead.
+    """
+
+    def log_density(points):
+        x, y = points.T
+        ridge = -0.5 * ((x - x_0) / sd) ** 2 - 0.5 * ((y - (x**2 - 2.5)) / width) ** 2
+        return ridge - np.log(2 * np.pi * sd * width)
+
+    adaptation = adapted(log_density, 2, count, min_effective=min_effective)
+    assert np.exp(adaptation.log_weights).mean() == pytest.approx(1, rel=0.1)
+    assert len(adaptation.points) == len(adaptation.log_weights)
+
+
 def test_the_proposal_is_a_normalised_density():
     proposal = Proposal(np.array([0.3, -0.2]), np.array([[0.5, 0.0], [0.3, 0.2]]))
     line = np.linspace(-30, 30, 1501)

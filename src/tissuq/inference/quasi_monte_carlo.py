@@ -36,7 +36,9 @@ WIDE_SHARE = 0.1
 """Share of the proposal that stays as wide as the prior, so that no weight is without bound there."""
 LOG_OF_NOTHING = -1e300
 """Stands for the logarithm of a weight that is zero or not a number."""
-MAX_ROUNDS = 15
+MAX_ROUNDS, MAX_SEARCHES = 15, 4
+MAX_CHANGE = 0.15
+"""Of the logarithm of the mass, in the last round."""
 MIN_EFFECTIVE_SHARE = 0.3
 """Share of a round's points that must be effective for the adaptation to end."""
 
@@ -145,15 +147,38 @@ def adapted(
 
     Rounds of quasi-random points come nearer to the density: all points so far, weighted by a power of the density over
     the mixture of all proposals so far, give the next t distribution its mean and covariance; the power is the
-    largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering). ``count`` is the
-    number of points in a round, ``start`` the first proposal, and ``min_effective`` how many of all points are to be
-    effective in the end (by default a share of those of the last round).
+    largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering). Where the rounds do
+    not suffice, as on the way to a density that is far and narrow, the last proposal is the first of as many others,
+    whose points alone count. ``count`` is the number of points in a round, ``start`` the first proposal, and
+    ``min_effective`` how many of all points are to be effective in the end (by default a share of those of the last
+    round).
     """
     count = count or 16 + 16 * dimension
-    least_effective = 4.0 + 4 * dimension
-    proposal = start or Proposal(np.zeros(dimension), np.eye(dimension))
-    proposals, points, values = [], np.zeros((0, dimension)), np.zeros(0)
     uniforms = even_points(dimension, count * MAX_ROUNDS)
+    proposal = start or Proposal(np.zeros(dimension), np.eye(dimension))
+    for _ in range(MAX_SEARCHES):
+        adaptation, is_near = _search(log_density, uniforms, proposal, min_effective)
+        if is_near:
+            break
+        proposal = adaptation.proposal
+    return adaptation
+
+
+def _search(
+    log_density: Callable[[FloatArray], FloatArray],
+    uniforms: FloatArray,
+    start: Proposal,
+    min_effective: float | None,
+) -> tuple[Adaptation, bool]:
+    """Return what the rounds of one search lead to, and whether enough of their points are effective.
+
+    On the way along a ridge many points may be effective among those that lie lower, and the mass still grows: it is to
+    have settled from one round to the next, unless the first proposal was good enough.
+    """
+    dimension, count = uniforms.shape[1], len(uniforms) // MAX_ROUNDS
+    least_effective = 4.0 + 4 * dimension
+    proposal, proposals = start, list[Proposal]()
+    points, values, log_mass = np.zeros((0, dimension)), np.zeros(0), -np.inf
     for round_ in range(MAX_ROUNDS):
         new = proposal.points(uniforms[round_::MAX_ROUNDS])
         proposals.append(proposal)
@@ -169,11 +194,13 @@ def adapted(
         covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
         proposal = Proposal(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
         of_round = effective(values[-count:] - proposals[-1].log_density(new)) if power == 1 else 0.0
-        if min_effective is None and of_round > MIN_EFFECTIVE_SHARE * count:
-            break
-        if min_effective is not None and effective(log_weights) > min_effective:
-            break
-    return Adaptation(proposal, points, log_weights)
+        is_found = of_round > MIN_EFFECTIVE_SHARE * count
+        if min_effective is not None:
+            is_found = effective(log_weights) > min_effective
+        log_mass, earlier_log_mass = float(np.logaddexp.reduce(log_weights)) - log(len(points)), log_mass
+        if is_found and (round_ == 0 or abs(log_mass - earlier_log_mass) < MAX_CHANGE):
+            return Adaptation(proposal, points, log_weights), True
+    return Adaptation(proposal, points, log_weights), False
 
 
 def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:

@@ -186,13 +186,20 @@ class ErrorEstimates:
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable.
 
-        Which has one peak: lags are tried from the middle of the grid upwards, as long as it rises.
+        Which has one peak: lags are tried from the middle of the grid upwards, as long as it rises. Where the noise is
+        summed over, each lag is compared at the level that suits it best.
         """
         if not model.noise.is_consecutive or model.fitted_errors.lag is not None:
             return model
+        level, solve = model.fitted_errors.level or model.noise_of_tests[1], self._similar_solver()
+
+        def log_evidence_at(lag: float) -> float:
+            lagged = model.with_errors(lag=lag)
+            return self._best_level(lagged, level, solve)[1] if self._sums_noise(model) else self._evidence(lagged)
+
         best, evidences = len(LAG_GRID) // 2, dict[int, float]()
         while new := {best - 1, best, best + 1} & set(range(len(LAG_GRID))) - evidences.keys():
-            evidences |= {index: self._evidence(model.with_errors(lag=LAG_GRID[index])) for index in new}
+            evidences |= {index: log_evidence_at(LAG_GRID[index]) for index in sorted(new)}
             best = max(evidences, key=lambda index: evidences[index])
         indices = sorted(evidences)
         lags, log_evidence = np.arctanh(LAG_GRID)[indices], np.array([evidences[index] for index in indices])

@@ -14,6 +14,7 @@ from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.enumerators.outer_search import Guide
+from tissuq.inference.enumerators.quadrature import RELATIVE_TOLERANCE, ROUGH_TOLERANCE
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates
@@ -80,11 +81,14 @@ class Solver:
         """Return whether a model is solved as a sum over values of its noise."""
         return self._is_integrated(model) and not NoiseGrid.why_not(model)
 
-    def _solve(self, models: Sequence[StatisticalModel], *, is_checked: bool = True) -> Sequence[Solution]:
-        """Solve models on the same stretches: together by one enumerator, or each by NUTS where that does not serve."""
+    def _solve(self, models: Sequence[StatisticalModel], cells: AdaptiveCells | None = None) -> Sequence[Solution]:
+        """Solve models on the same stretches: together by one enumerator, or each by NUTS where that does not serve.
+
+        Where it is cells that serve, by those given.
+        """
         enumerator = self._enumerator(models[0])
-        if isinstance(enumerator, AdaptiveCells):
-            enumerator = AdaptiveCells(is_checked)
+        if cells and isinstance(enumerator, AdaptiveCells):
+            enumerator = cells
         try:
             return enumerator.solve(models, self.seed)
         except ConvergenceError as error:
@@ -97,12 +101,13 @@ class Solver:
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy))
+        tolerance = RELATIVE_TOLERANCE if accuracy == FINE else ROUGH_TOLERANCE
         are_checked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
-            return self._solve([model], is_checked=next(are_checked, False))[0]
+            return self._solve([model], AdaptiveCells(next(are_checked, False), tolerance))[0]
 
         return solve_known
 

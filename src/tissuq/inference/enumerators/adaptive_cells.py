@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
+    RELATIVE_TOLERANCE,
     START_PROBABILITIES,
     Lines,
     Quadrature,
@@ -59,9 +60,12 @@ class AdaptiveCells:
     is_checked : bool
         Whether climbs from other values of the structure see that no mass was missed, which takes as long again; of
         models that differ by the noise alone one tells it of all.
+    tolerance : float
+        Of the interpolation, relative to the integral.
     """
 
     is_checked: bool = True
+    tolerance: float = RELATIVE_TOLERANCE
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""
@@ -111,7 +115,7 @@ class AdaptiveCells:
         with one_thread():
             return [
                 _solution(integration, index, seed)
-                for integration in (_Integration(block, is_checked=self.is_checked) for block in blocks)
+                for integration in (_Integration(block, self) for block in blocks)
                 for index in range(len(integration.models))
             ]
 
@@ -119,7 +123,7 @@ class AdaptiveCells:
 class _Integration:
     """Everything that data sets on the same stretches share while their nonlinear parameters are integrated."""
 
-    def __init__(self, models: Sequence[StatisticalModel], *, is_checked: bool) -> None:
+    def __init__(self, models: Sequence[StatisticalModel], cells: AdaptiveCells) -> None:
         self.models = models
         self.conditional = ConditionalGaussian(models)
         self.dimension = len(models[0].nonlinear)
@@ -129,12 +133,12 @@ class _Integration:
         self.warp: Warp | None = None
         if self.dimension:
             self.warp = warp_along(survey(self._priors, len(models[0].structure), self._log_ceiling))
-            self.rule = integrate(self._log_integrand, self.dimension)
+            self.rule = integrate(self._log_integrand, self.dimension, cells.tolerance)
             self.settings = self.warp.parameters(self.rule.points)[0]
         else:
             self.settings = np.zeros((len(models), 1, 0))
         self.gaussians = self.conditional(self.settings)
-        if is_checked and self.rule and len(models[0].structure) > 1:
+        if cells.is_checked and self.rule and len(models[0].structure) > 1:
             for index in range(len(models)):
                 self._check_found(index, self.rule.weights[index])
 

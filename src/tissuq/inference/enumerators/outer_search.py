@@ -120,7 +120,7 @@ class _Search:
         count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
         min_effective = guide.accuracy.min_effective
         adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
-        guide.proposal = adaptation.proposal
+        guide.proposal, nodes = adaptation.proposal, nodes[-len(adaptation.points) :]
         error = relative_error(self._outer, adaptation.log_weights, min_effective)
         return *_weighted(nodes, adaptation.log_weights - np.log(len(nodes))), error
 

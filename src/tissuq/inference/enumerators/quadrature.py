@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 
-__all__ = ["MAX_DIMENSION", "START_PROBABILITIES", "Lines", "Quadrature", "gauss_rule", "has_missed", "integrate"]
+__all__ = [
+    "MAX_DIMENSION",
+    "RELATIVE_TOLERANCE",
+    "ROUGH_TOLERANCE",
+    "START_PROBABILITIES",
+    "Lines",
+    "Quadrature",
+    "gauss_rule",
+    "has_missed",
+    "integrate",
+]
 
 FloatArray = NDArray[np.float64]
 LogFunction = Callable[[FloatArray], FloatArray]
@@ -23,8 +33,8 @@ ORDERS = {1: 10, 2: 10, 3: 7}
 """Gauss-Legendre points along each side of a cell, by dimension."""
 FIRST_CELLS_PER_SIDE = 2
 """Cells along each side to begin with."""
-RELATIVE_TOLERANCE = 1e-3
-"""Of the interpolation, over the integral, at which cells are no longer halved."""
+RELATIVE_TOLERANCE, ROUGH_TOLERANCE = 1e-3, 0.03
+"""Of the interpolation, over the integral, at which cells are no longer halved; and where a rough integral will do."""
 MAX_CELLS = 20_000
 
 
@@ -142,11 +152,12 @@ class Quadrature:
         )
 
 
-def integrate(log_function: LogFunction, dimension: int) -> Quadrature:
+def integrate(log_function: LogFunction, dimension: int, tolerance: float = RELATIVE_TOLERANCE) -> Quadrature:
     """Integrate exp(log_function) over the unit cube of one to three dimensions, for B functions at once.
 
     Cells are halved along the side in which a function is worst resolved until the interpolation error of every
-    function is below a thousandth of its integral; the integral itself is then right to about a millionth.
+    function is below a share of its integral, the tolerance. With a thousandth the integral itself is right to about a
+    millionth.
 
     Parameters
     ----------
@@ -154,6 +165,7 @@ def integrate(log_function: LogFunction, dimension: int) -> Quadrature:
         Maps (N, d) points to (B, N) values; -inf where a function vanishes.
     dimension : int
         One to three.
+    tolerance : float
 
     Raises
     ------
@@ -171,7 +183,7 @@ def integrate(log_function: LogFunction, dimension: int) -> Quadrature:
         integrals, errors = _resolve(cells, top)
         total = integrals.sum(axis=1, keepdims=True)
         error = errors.max(axis=2) / total
-        if (error.sum(axis=1) <= RELATIVE_TOLERANCE).all():
+        if (error.sum(axis=1) <= tolerance).all():
             return _finish(cells, top, integrals, error)
         if cells.log_values.shape[1] > MAX_CELLS:
             raise ConvergenceError(
