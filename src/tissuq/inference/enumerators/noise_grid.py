@@ -176,7 +176,7 @@ def _refined(
 
 def _nodes(log_noises: FloatArray, logs: FloatArray) -> FloatArray:
     """Return equally spaced values over the range in which a function, roughly known, is not negligible."""
-    table, density = _table(log_noises, logs)
+    table, density = _table(log_noises, logs, is_local=True)
     matters = table[density > np.exp(-NEGLIGIBLE_DROP)]
     low, high = max(float(matters[0]), float(log_noises[0])), float(matters[-1])
     return np.linspace(low, high, 1 + max(INTERVALS, int(np.ceil((high - low) / MAX_NODE_STEP))))
