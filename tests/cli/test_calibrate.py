@@ -157,6 +157,13 @@ def test_a_server_that_a_configuration_names_is_asked_only_when_the_command_line
     assert "add --umbridge http://127.0.0.1:9" in said.err
 
 
+def test_a_calibration_without_a_law_says_what_other_commands_need(calibrate_run):
+    folder, _ = calibrate_run
+    said = run_in(folder, "predict", "run")
+    assert said.status == 2
+    assert "repeat tissuq calibrate with the law of the model" in " ".join(said.err.split())
+
+
 PUNCH = """
 def force(parameters, depth):
     stretch = 1 - depth

@@ -97,7 +97,7 @@ def test_two_controls_are_given_apart(cli, here, run):
 BAD = [
     ([], ["RUN", "--config"]),
     (["nowhere"], ["there is no run folder 'nowhere'"]),
-    (["."], ["is not a complete run of tissuq fit"]),
+    (["."], ["no posterior of a material", "give the folder of a run of tissuq fit"]),
     (["RUN"], ["has several discrepancies", "constant, gp, none"]),
     (["RUN", "--discrepancy", "cubic"], ["'cubic'", "constant"]),
     (["RUN", "--discrepancy", "none", "--mode", "torsion"], ["'torsion'", "planar", "For torsion take 'simple-shear'"]),

@@ -256,6 +256,32 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     assert any("reaches the bound of the prior of C10 (upper)" in text for text in found.warnings)
 
 
+def test_a_parameter_that_the_model_does_not_use_is_named_and_one_that_is_hardly_known_is_not():
+    priors = {"C10": tq.Uniform(0.2, 5.0), "c10": tq.Uniform(0.2, 5.0)}
+    data = measured(neo_hooke, {"C10": 1.2}, 0.02)
+    found = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, runs=10)
+    (text,) = [text for text in found.warnings if "hardly depends on" in text]
+    assert text.startswith("the model hardly depends on c10, and")
+    both = tq.calibrate(
+        DEPTH, data, lambda p: neo_hooke({"C10": p["C10"] + 0.1 * p["c10"]}), priors, noise_sd=0.02, runs=10
+    )
+    assert not any("hardly depends on" in text for text in both.warnings)
+
+
+def test_a_process_pinned_far_from_the_measurements_is_told():
+    stretch = np.linspace(1.02, 1.3, 8)
+
+    def tension(parameters, stretch):
+        return 2 * parameters["C10"] * (stretch - stretch**-2)
+
+    data = tension({"C10": 1.2}, stretch) + 0.02 * np.random.default_rng(2).standard_normal(8)
+    usual = {"forward": tension, "priors": {"C10": tq.Uniform(0.2, 5.0)}, "noise_sd": 0.02, "runs": 8}
+    for zero_load, is_told in ((0.0, True), (1.0, False)):
+        found = tq.calibrate(stretch, data, **usual, discrepancy="gp-pinned", zero_load=zero_load)
+        told = [text for text in found.warnings if "of stretches --zero-load 1" in text]
+        assert len(told) == is_told
+
+
 @pytest.mark.slow
 def test_measurements_that_no_parameters_give_are_told():
     """The model is proportional to C10: beyond the prior's end, or of another shape, nothing comes near."""
@@ -354,6 +380,7 @@ def test_a_saved_calibration_is_read_by_xarray(tmp_path):
         ({"priors": {}}, "give a prior for every parameter"),
         ({"priors": {"C10": tq.Flat()}}, "flat and improper"),
         ({"priors": {"C10": 3.0}}, "must be a prior"),
+        ({"priors": {"C10": tq.Uniform(0.2, 5.0), "noise_sd": tq.Uniform(0, 1)}}, r"prior of noise_sd .* \(0.1\)"),
         ({"noise_sd": -1.0}, "noise_sd must be a positive number"),
         ({"discrepancy": "auto"}, "'auto' cannot be used with a forward model"),
         ({"forward": 3}, "must be a function"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -9,7 +11,7 @@ from scipy.stats import multivariate_normal
 import tissuq as tq
 from tissuq.emulation.prior_correlation import correlated
 from tissuq.errors import InputError
-from tissuq.studies.prior_of_run import priors_of
+from tissuq.studies.prior_of_run import priors_of, priors_of_run
 
 PRIORS = {"mu": tq.LogNormal(2.0, 0.3), "alpha": tq.Normal(-8.0, 1.5), "b": tq.Uniform(0.0, 1.0)}
 CORRELATION = -0.8
@@ -86,3 +88,21 @@ def test_correlations_that_contradict_each_other_are_refused():
     normal = {name: tq.Normal(0.0, 1.0) for name in "abc"}
     with pytest.raises(InputError, match="contradict"):
         correlated(normal, {("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9})
+
+
+def test_of_a_run_of_several_laws_the_one_of_the_model_is_the_prior_and_of_several_discrepancies_a_file(tmp_path):
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.01, seed=1)
+    for folder, names in (("laws", ("neo-hookean", "yeoh")), ("several", ("gp", "none"))):
+        (tmp_path / folder / "posterior").mkdir(parents=True)
+        for name in names:
+            law, discrepancy = (name, "none") if folder == "laws" else ("neo-hookean", name)
+            posterior = tq.fit(data, material=law, discrepancy=discrepancy, noise_sd=0.01)
+            posterior.save(tmp_path / folder / "posterior" / f"{name}.nc")
+    assert list(priors_of_run(tmp_path / "laws", "yeoh", "MPa")[0]) == ["C10", "C20", "C30"]
+    file = tmp_path / "several" / "posterior" / "none.nc"
+    with pytest.raises(InputError, match=f"several posteriors: .* --prior-run .* or {re.escape(str(file))}"):
+        priors_of_run(tmp_path / "several", "neo-hookean", "MPa")
+    (prior,) = priors_of_run(file, "neo-hookean", "MPa")[0].values()
+    assert prior.median == pytest.approx(0.5, rel=0.05)
+    with pytest.raises(InputError, match="fit the tests with --material yeoh"):
+        priors_of_run(file, "yeoh", "MPa")

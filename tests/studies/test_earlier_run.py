@@ -66,7 +66,7 @@ def test_auto_is_taken_unless_another_is_named(run):
 def test_other_folders_are_refused(run, tmp_path):
     with pytest.raises(tq.InputError, match="there is no run folder"):
         tq.load(tmp_path / "none")
-    with pytest.raises(tq.InputError, match="not a complete run"):
+    with pytest.raises(tq.InputError, match="has no posterior of a material"):
         tq.load(tmp_path)
     recipe = run / "run.toml"
     recipe.write_text(recipe.read_text().replace("tissuq fit", "tissuq paper"))

@@ -124,7 +124,14 @@ class Calibration:
         """Warnings that the user must read, in sentences."""
         exact = self.without_emulator_error.posterior
         sentences = calibration_warnings(
-            self.problem, self.emulator, self.check, self.posterior, exact, self.emulator_share, self.likelihood
+            self.problem,
+            self.emulator,
+            self.check,
+            self.posterior,
+            exact,
+            self.emulator_share,
+            dict(zip(self.problem.forward_symbols, self.sensitivity["total"].tolist(), strict=True)),
+            self.likelihood,
         )
         return tuple(sentences)
 

@@ -20,7 +20,7 @@ from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["DISCREPANCIES", "Method", "Problem", "pose", "symbol_of"]
+__all__ = ["DISCREPANCIES", "Method", "Problem", "is_far", "pose", "symbol_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -141,6 +141,11 @@ def pose(
             error_priors[symbol] = priors.get(symbol) or _default_prior(parameter, controls, values)
             if isinstance(error_priors[symbol], Prior):
                 error_priors[symbol].within(parameter.support)
+    for name, sd in noises.items():
+        if sd != "unknown" and (symbol := symbol_of(NOISE_SD.symbol, name)) in priors:
+            raise InputError(
+                f"a prior of {symbol} is given, and the noise, too ({sd:g}): leave out one of --prior and --noise-sd."
+            )
     forward = {symbol: prior for symbol, prior in priors.items() if symbol not in error_priors}
     _check_priors(forward, error_priors)
     ends = np.cumsum([0, *(len(values) for _, values in columns.values())]).tolist()
@@ -160,6 +165,11 @@ def pose(
 def symbol_of(symbol: str, quantity: str) -> str:
     """Return the symbol of an error's parameter for a quantity, such as c_force; with a single quantity c."""
     return f"{symbol}_{quantity}" if quantity else symbol
+
+
+def is_far(control: FloatArray, zero_load: float) -> bool:
+    """Return whether a process that is pinned at zero load is as good as free at all controls (n,)."""
+    return bool(np.abs(control - zero_load).min() > np.ptp(control))
 
 
 def _columns(

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.emulator import Emulator
-from tissuq.emulation.problem import Problem
+from tissuq.emulation.problem import Problem, is_far
 from tissuq.emulation.runs import EmulatorCheck
 from tissuq.experiments.smoothing import scatter
+from tissuq.model.discrepancy import PinnedProcess
 
 if TYPE_CHECKING:
     from tissuq.emulation.likelihood import Likelihood
@@ -43,6 +44,9 @@ MAX_SCATTERS, MAX_SHARE_OFF = 5.0, 0.1
 where an unknown noise stands for a model that cannot give them."""
 MAX_SHARE_NEAR_FAILURES = 0.05
 """Largest share of the posterior nearer to a failed run than to any other without a warning."""
+MIN_EFFECT, MIN_SHARE_OF_PRIOR = 1e-3, 0.9
+"""Total sensitivity index below which, and width of the posterior over that of the prior from which, a parameter is
+said to have no effect."""
 DRAWS_NEAR_FAILURES = 400
 """Number of draws from which that share is computed."""
 DISCREPANCY_WARNINGS = {
@@ -68,6 +72,7 @@ def calibration_warnings(
     posterior: SampledPosterior,
     exact: SampledPosterior,
     emulator_share: Mapping[str, float],
+    totals: Mapping[str, float],
     likelihood: Likelihood,
 ) -> Iterator[str]:
     """Yield the warnings that a calibration carries, the gravest first.
@@ -82,10 +87,18 @@ def calibration_warnings(
         With the emulator's error, and as if it were exact.
     emulator_share : mapping of str to float
         Share of every parameter's posterior variance that is due to the emulator's error.
+    totals : mapping of str to float
+        Total sensitivity index of every parameter of the model.
     likelihood : Likelihood
     """
     if not posterior.converged:
         yield posterior.verdict
+    if without_effect := list(_without_effect(problem, posterior, totals)):
+        yield (
+            f"the model hardly depends on {', '.join(without_effect)}, and the result is the prior: see whether the "
+            "model reads a parameter of this name (--prior)."
+        )
+    yield from _far_from_zero_load(problem)
     none_fit = list(_no_parameters_fit(problem, emulator, posterior, likelihood))
     yield from none_fit
     if emulator.runs.failed.any():
@@ -158,6 +171,31 @@ def _no_parameters_fit(
         "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
         "model (discrepancy gp-pinned)."
     )
+
+
+def _without_effect(problem: Problem, posterior: SampledPosterior, totals: Mapping[str, float]) -> Iterator[str]:
+    """Yield the parameters on which the outputs do not depend, and that the measurements leave where they were."""
+    for symbol, prior in problem.forward_priors.items():
+        if totals[symbol] < MIN_EFFECT:
+            prior_width, width = (of.quantile(0.75) - of.quantile(0.25) for of in (prior, posterior.marginals[symbol]))
+            if width > MIN_SHARE_OF_PRIOR * prior_width:
+                yield symbol
+
+
+def _far_from_zero_load(problem: Problem) -> Iterator[str]:
+    """Yield a warning where a process is pinned so far from the measurements that it is free at all of them."""
+    if not isinstance(problem.discrepancy, PinnedProcess):
+        return
+    zero_load = problem.discrepancy.references[0]
+    for name, (start, stop) in problem.quantities.items():
+        control = problem.control[start:stop]
+        if is_far(control, zero_load):
+            yield (
+                f"gp-pinned is zero at the control {zero_load:g} (--zero-load), which is far from those "
+                f"{f'of {name} ' if name else ''}that were measured, {control.min():.4g} to {control.max():.4g}: the "
+                "discrepancy then takes a share of the initial stiffness, as gp does. Give the control at which there "
+                "is no load: of stretches --zero-load 1."
+            )
 
 
 def _rms(values: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
 from tissuq.emulation import Calibration, DeckForward, FileForward, SeveralModels
+from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
@@ -118,7 +119,10 @@ def _next_step(study: CalibrationStudy) -> str:
     if max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols) > LARGE_SHARE:
         return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."
     if not calibration.problem.discrepancy.is_correlated:
-        return "let the forward model be wrong: repeat the command with --discrepancy gp-pinned --force."
+        zero = study.settings.zero_load
+        is_unknown = any(is_far(measured.control, zero) for measured in study.data.values())
+        at = " --zero-load C, C the control at which there is no load (of stretches 1)" if is_unknown else ""
+        return f"let the forward model be wrong: repeat the command with --discrepancy gp-pinned --force{at}."
     if study.posterior is not None:
         return "take the material further: tissuq predict, export or structure {run}"
     return "name the law of the model with --material LAW; predict, export and structure then take the run."

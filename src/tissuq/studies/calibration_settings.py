@@ -171,7 +171,9 @@ class CalibrationSettings(ModelSettings):
             raise ValueError("give the prior of every parameter of the model, as in C10=uniform(0.1, 5), or a run "
                              "whose posterior they are (prior_run)")  # fmt: skip
         if self.prior_run is not None and self.material is None:
-            raise ValueError("prior_run needs the law in the forward model (material), whose posterior it is")
+            raise ValueError(
+                "a run as prior (--prior-run) needs the law in the forward model, whose posterior it is (--material)"
+            )
         self._check_deck()
         self._check_noise()
         if (self.material is None) != (self.range is None):

@@ -17,7 +17,9 @@ from tissuq.studies.settings import RECIPE, damage_reported, load_settings, sett
 if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenSettings
 
-__all__ = ["POSTERIORS", "answering", "load", "load_run", "load_without_discrepancy", "modes_of", "recipe_of"]
+__all__ = [
+    "POSTERIORS", "answering", "load", "load_run", "load_without_discrepancy", "modes_of", "posteriors_in", "recipe_of",
+]  # fmt: skip
 
 POSTERIORS = "posterior"
 """Subfolder of a run with a file for each of its posteriors."""
@@ -85,7 +87,7 @@ def load_without_discrepancy(folder: str | Path, material: Material | None = Non
     from tissuq.studies.specimen import fitted
 
     run = Path(folder)
-    if NoDiscrepancy.name in _files(run):
+    if NoDiscrepancy.name in posteriors_in(run):
         return load(run, NoDiscrepancy.name, material)
     return fitted(recipe_of(run), NoDiscrepancy.name, run, material)
 
@@ -109,7 +111,7 @@ def answering(folder: str | Path) -> str:
     InputError
         As `recipe_of`.
     """
-    files = _files(Path(folder))
+    files = posteriors_in(Path(folder))
     if Auto.name in files:
         return Auto.name
     return next((name for name in recipe_of(folder).discrepancies if name in files), "")
@@ -127,7 +129,7 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
 
     run = Path(folder)
     recipe = run / RECIPE
-    _files(run)
+    posteriors_in(run)
     if not recipe.is_file():
         raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE}.")
     with damage_reported(recipe):
@@ -137,13 +139,22 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
     return load_settings(LawSettings if _compares_laws(run) else SpecimenSettings, recipe, {})
 
 
-def _files(run: Path) -> dict[str, Path]:
+def posteriors_in(run: Path) -> dict[str, Path]:
     """Return the files with the posteriors of a run, by discrepancy."""
     if not run.is_dir():
         raise InputError(f"there is no run folder '{run}'.")
     files = {file.stem: file for file in sorted((run / POSTERIORS).glob("*.nc"))}
     if not files:
-        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it has no {POSTERIORS}/*.nc.")
+        is_calibration = False
+        with suppress(InputError):
+            is_calibration = setting_of(run / RECIPE, "server_model") is not None
+        advice = (
+            "repeat tissuq calibrate with the law of the model and the stretches in it, as in --material neo-hookean "
+            "--range 0.7:1.3"
+            if is_calibration
+            else "give the folder of a run of tissuq fit, as in runs/specimen"
+        )
+        raise InputError(f"folder '{run}' has no posterior of a material ({POSTERIORS}/*.nc): {advice}.")
     return files
 
 
@@ -152,7 +163,7 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None, material: str | M
 
     A law is also chosen by the name that is given for the discrepancy, as it was before it had an option of its own.
     """
-    files, is_of_laws = _files(run), _compares_laws(run)
+    files, is_of_laws = posteriors_in(run), _compares_laws(run)
     names = list(files)
     name = discrepancy.name if isinstance(discrepancy, Discrepancy) else discrepancy
     law = material.name if isinstance(material, Material) else material

@@ -9,9 +9,10 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import material_named
+from tissuq.model.discrepancy import Auto
 from tissuq.parameters.priors import LogNormal, Normal, Prior
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.earlier_run import load
+from tissuq.studies.earlier_run import load, posteriors_in
 
 __all__ = ["priors_of", "priors_of_run"]
 
@@ -29,8 +30,13 @@ def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior]
     InputError
         When there is no such run, or it is of another law, or its posterior has no such form.
     """
-    posterior = load(run)
-    law, fitted = material_named(material), posterior.model.material
+    law = material_named(material)
+    files = posteriors_in(run) if run.is_dir() else {}
+    if len(files) > 1 and not {law.name, Auto.name} & set(files):
+        named = " or ".join(map(str, files.values()))
+        raise InputError(f"the run '{run}' has several posteriors: give the file of one, --prior-run {named}.")
+    posterior = load(run, law.name if law.name in files else None)
+    fitted = posterior.model.material
     if law.name != fitted.name:
         raise InputError(
             f"the run '{run}' is of the material {fitted.name}, and the forward model has {law.name}: fit the tests "
