@@ -105,7 +105,7 @@ def test_fits_of_other_data_and_single_fits_are_refused(fits):
     planar = tq.fit(tq.Experiment("planar", STRETCH, DATA.stress), discrepancy="none", noise_sd=0.05)
     with pytest.raises(tq.InputError, match="loading modes"):
         tq.compare({"none": fits["none"], "planar": planar})
-    with pytest.raises(tq.InputError, match="not a posterior of tissuq"):
+    with pytest.raises(tq.InputError, match="no fit of measured stresses"):
         tq.compare({"none": fits["none"], "foreign": xr.DataTree()})
 
 

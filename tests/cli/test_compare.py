@@ -85,11 +85,11 @@ def test_what_is_no_run_is_refused(cli, here, arguments, words):
     assert "Traceback" not in said.err
 
 
-def test_a_file_that_is_no_posterior_is_refused(cli, here):
+def test_a_file_that_is_no_posterior_is_named_and_refused(cli, here):
     (here / "broken.nc").write_text("nothing")
     said = cli("compare", "broken.nc", "broken.nc")
     assert said.status == 2
-    assert "cannot be read" in said.err
+    assert "'broken.nc' is damaged or no posterior of tissuq" in " ".join(said.err.split())
 
 
 @pytest.mark.slow

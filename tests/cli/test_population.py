@@ -103,6 +103,14 @@ def test_predictions_and_cards_start_from_a_new_patient(population_run):
 
 
 @pytest.mark.slow
+def test_no_next_test_is_sought_beside_a_new_patient_of_whom_nothing_was_measured(population_run):
+    folder, _ = population_run
+    said = run_in(folder, "design", "run", "--out", "design")
+    assert said.status == 2
+    assert "no stress was measured, it gives a new specimen of the population" in " ".join(said.err.split())
+
+
+@pytest.mark.slow
 def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_run, tmp_path):
     """The stub's force is the C10 that stands in the deck; that of a case is in proportion to C10."""
     pytest.importorskip("felupe", reason="FElupe is not installed")

@@ -331,7 +331,8 @@ def _check_comparable(trees: Mapping[str, Any]) -> None:
     for name, tree in trees.items():
         if not {"observed_data", "constant_data", "leave_one_out"} <= set(tree.children):
             raise InputError(
-                f"'{name}' is not a posterior of tissuq: it has no measurements or no leave-one-out densities."
+                f"'{name}' is no fit of measured stresses, of which each was left out in turn: compare runs of tissuq "
+                "fit of the same measurements."
             )
     first_tree = trees[names[0]]
     for name in names[1:]:

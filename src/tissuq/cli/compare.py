@@ -75,11 +75,14 @@ def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:
         for path in paths:
             name = f"{run.name}/{path.stem}" if run.is_dir() and len(runs) > 1 else path.stem
             files[name if name not in files else str(path)] = path
-    try:
-        trees = {name: xr.open_datatree(path, engine="h5netcdf").load() for name, path in files.items()}
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"a posterior cannot be read: {error}.") from error
+    trees: dict[str, xr.DataTree] = {}
     for name, path in files.items():
+        try:
+            trees[name] = xr.open_datatree(path, engine="h5netcdf").load()
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(
+                f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again."
+            ) from error
         trees[name].attrs |= _assessed(path)
     return trees
 

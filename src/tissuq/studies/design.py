@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.emulation.material_posterior import CALIBRATION
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
@@ -108,11 +107,10 @@ def run_design(
         )
     step("loading the run")
     posterior = load(folder / settings.run, settings.discrepancy, settings.law_of(law))
-    if posterior.solution.route == CALIBRATION:
+    if not posterior.solution.is_of_data:
         raise ModelError(
-            f"run '{settings.run}' is the calibration of a model: of it no stress was measured, so that what a further "
-            "test would tell beside it is not known. Take a run of tissuq fit; calibrate takes a run as prior "
-            "(--prior-run)."
+            f"of run '{settings.run}' no stress was measured, it gives {posterior.solution.reason}: what a further "
+            "test would tell beside it is not known. Take a run of tissuq fit."
         )
     targets = tuple(
         ensemble_target(name, posterior, folder) if names_ensemble(name) else target_named(name, posterior.model)
