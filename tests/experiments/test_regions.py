@@ -93,6 +93,17 @@ def test_outliers_are_said_and_the_advice_leaves_them_out(inspected):
     assert len(inspection.reading.experiment) == 119
 
 
+def test_rows_that_are_all_there_several_times_are_said_and_the_advice_leaves_them_out(inspected):
+    stretch, stress = 1 + 0.3 * WAY, 10 * WAY + WAY**2
+    (note,) = inspected(np.repeat(stretch, 3), np.repeat(stress, 3)).warnings
+    assert note.startswith("every row is there 3 times, one after the other")
+    inspection = inspected(
+        np.repeat(stretch, 3), np.repeat(stress, 3), every=int(re.search(r"--every (\d+)\.$", note)[1])
+    )
+    assert inspection.warnings == ()
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
+
+
 def test_copied_rows_are_said_and_the_advice_leaves_them_out(inspected):
     rows = np.r_[0:80, 30:121]
     notes = inspected((1 + 0.3 * WAY)[rows], (10 * WAY + WAY**2)[rows]).warnings

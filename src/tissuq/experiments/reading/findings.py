@@ -94,6 +94,13 @@ def _stretch_size(reading: Reading, number: int) -> str:
     largest = float(reading.used.stretch[number].max())
     if largest <= LARGE_STRETCH:
         return ""
+    choice = reading.choices[0]
+    if choice.measure == "stretch":
+        column = reading.table.label(choice.deformation)
+        return (
+            f"the largest stretch is {largest:.4g}: see whether column {column} holds stretches, deformed over "
+            "undeformed length; where these are in percent, write % in its heading, as in 'stretch (%)'."
+        )
     return f"the largest stretch is {largest:.4g}: check the length of the specimen and the unit of the displacement."
 
 

@@ -261,6 +261,20 @@ def _copies(tested: TestedStress) -> Iterator[Region]:
         )
 
 
+def _repeated(tested: TestedStress) -> Iterator[Region]:
+    """Yield the repetitions where every row is there as often, one after the other: of a hold only some rows are."""
+    measured = np.vstack([tested.used.stretch, tested.used.stress])
+    first_rows = np.flatnonzero(np.append(True, (np.diff(measured, axis=1) != 0).any(axis=0)))
+    counts = np.diff(np.append(first_rows, measured.shape[1]))
+    if len(counts) >= FEWEST_COPIED_ROWS and counts[0] > 1 and (counts == counts[0]).all():
+        yield Region(
+            "copies",
+            np.setdiff1d(np.arange(measured.shape[1]), first_rows),
+            f"every row is there {counts[0]} times, one after the other, as in a copy and no measurement: to leave the "
+            f"copies out give --every {counts[0]}.",
+        )
+
+
 def _drift(tested: TestedStress) -> Iterator[Region]:
     if tested.rupture or tested.holds or tested.slips:
         return
@@ -338,6 +352,7 @@ CHECKS: tuple[Callable[[TestedStress], Iterator[Region]], ...] = (
     _saturation,
     _outliers,
     _copies,
+    _repeated,
     _drift,
     _load_step,
     _stretch_step,
