@@ -90,6 +90,11 @@ def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
 
 
 @pytest.mark.slow
+def test_the_next_step_names_all_options_that_a_law_needs(calibrate_run):
+    _, said = calibrate_run
+    assert "--material LAW --range LOW:HIGH --force" in " ".join(said.out.split())
+
+
 def test_lines_are_left_out_as_the_message_says(calibrate_run, tmp_path):
     folder, _ = calibrate_run
     write_all(tmp_path)
@@ -190,12 +195,36 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
     assert said.status == 0, said.err
 
 
+def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the_model_is_said(tmp_path):
+    (tmp_path / "cube.py").write_text(PUNCH)
+    (tmp_path / "cube.csv").write_text("depth,stress (kPa)\n0.1,1.01\n0.2,2.3\n0.3,4.0\n")
+    usual = ["calibrate", "cube.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
+    material = ["--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2", "--out", "run"]
+    said = run_in(tmp_path, *usual, *material)
+    assert said.status == 2
+    assert "--unit kPa or --unit MPa" in " ".join(said.err.split())
+    assert not list(tmp_path.glob("run*"))
+    said = run_in(tmp_path, *usual, *material, "--unit", "kPa")
+    assert said.status == 0, said.err
+    assert "kPa, 95 % HPD" in said.out
+
+
+def test_of_columns_of_one_name_the_number_is_asked_for(cli, here):
+    write_all(here)
+    (here / "two.csv").write_text("depth,force,depth,force\n0.1,1,0.1,2\n0.2,2,0.2,4\n")
+    said = cli(
+        "calibrate", "two.csv", "--forward", "force.py:force", *USUAL, "--control", "depth", "--measured", "force"
+    )
+    assert said.status == 2
+    assert "has 2 columns 'depth': give the number of one, 1 or 3" in " ".join(said.err.split())
+
+
 def test_a_material_without_its_range_or_parameters_is_refused_before_any_run(tmp_path):
     write_all(tmp_path)
     usual = ["calibrate", "punch.csv", "--forward", "force.py:force", *USUAL, "--out", "run"]
     said = run_in(tmp_path, *usual, "--material", "neo-hookean")
     assert said.status == 2
-    assert "material and range belong together" in said.err.replace("\n", " ")
+    assert "give --material LAW --range 0.7:1.3" in " ".join(said.err.split())
     said = run_in(tmp_path, *usual, "--material", "neo-hookean", "--range", "0.7:1.2")
     assert said.status == 2
     assert "calibrated without C10" in " ".join(said.err.split())

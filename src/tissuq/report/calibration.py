@@ -124,8 +124,11 @@ def _next_step(study: CalibrationStudy) -> str:
         at = " --zero-load C, C the control at which there is no load (of stretches 1)" if is_unknown else ""
         return f"let the forward model be wrong: repeat the command with --discrepancy gp-pinned --force{at}."
     if study.posterior is not None:
-        return "take the material further: tissuq predict, export or structure {run}"
-    return "name the law of the model with --material LAW; predict, export and structure then take the run."
+        return "take the material further: tissuq predict {run} (export and structure take the run, too)"
+    return (
+        "name the law of the model and the stretches in it: repeat the command with --material LAW --range LOW:HIGH "
+        "--force; predict, export and structure then take the run."
+    )
 
 
 def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -93,7 +93,7 @@ def _next_step_with(law: str, answer: Answer) -> str:
     """Return what to do next with a law; other laws were tried already."""
     step = STEPS["design"] if answer.next_step == STEPS["law"] else answer.next_step
     if "{run}" not in step.shell:
-        return f"{step.shell} Its posterior: tissuq predict, export or design {{run}} --material {law}"
+        return f"{step.shell} Its posterior: tissuq predict {{run}} --material {law} (export and design, too)"
     return step.shell.replace("{run}", f"{{run}} --material {law}")
 
 

@@ -142,7 +142,7 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
             f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
-    return "take a new specimen into finite elements: tissuq export, structure or ensemble {run}"
+    return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
 
 def _has(warnings: Sequence[str], code: str) -> bool:

@@ -19,6 +19,7 @@ from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.headings import heading, plain
 from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
+from tissuq.experiments.units import measured_in, stress_unit
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
@@ -114,6 +115,8 @@ def run_calibration(
         check_material(settings.material, settings.parameter_priors, settings.unit)
     data, experiments = _read(settings, folder)
     units = {name: measured.units for name, measured in data.items()}
+    if settings.material is not None and not settings.models:
+        _check_unit(settings, [measured for _, measured in units.values()])
     forward = settings.forward_model(folder, units, experiments, **running)
     start = perf_counter()
     names = ("discrepancy", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
@@ -152,6 +155,19 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
         "prior_run": None,
     }
     return settings.model_copy(update=changes)
+
+
+def _check_unit(settings: CalibrationSettings, measured: Sequence[str]) -> None:
+    """Refuse measured stresses in another unit than the law, unless the user says that the model is in this one."""
+    if "unit" in settings.model_fields_set:
+        return
+    for unit in measured:
+        if measured_in(unit) == "stress" and stress_unit(unit).to_mpa != stress_unit(settings.unit).to_mpa:
+            raise InputError(
+                f"the measured values are in {unit}, and the parameters of {settings.material} would be taken in "
+                f"{settings.unit}: say in which unit of stress the model computes, --unit {unit} or --unit "
+                f"{settings.unit}."
+            )
 
 
 def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measured], list[OfModel]]:
@@ -254,6 +270,9 @@ def _has(table: Table, name: str) -> bool:
 
 def _place(table: Table, requested: str | int) -> int:
     matches = [index for index, name in enumerate(table.names) if name == requested]
+    if len(matches) > 1:
+        numbers = " or ".join(str(index + 1) for index in matches)
+        raise InputError(f"{table.file} has {len(matches)} columns '{requested}': give the number of one, {numbers}.")
     if matches:
         return matches[0]
     matches = [index for index, name in enumerate(table.names) if heading(name).quantity == plain(str(requested))]

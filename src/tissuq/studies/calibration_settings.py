@@ -177,8 +177,8 @@ class CalibrationSettings(ModelSettings):
         self._check_deck()
         self._check_noise()
         if (self.material is None) != (self.range is None):
-            raise ValueError("material and range belong together: the law of the forward model, and its stretches, "
-                             "such as 0.7:1.3")  # fmt: skip
+            raise ValueError("the law of the forward model and its stretches belong together: give --material LAW "
+                             "--range 0.7:1.3")  # fmt: skip
         if self.range is not None and not RANGE.fullmatch(self.range):
             raise ValueError(f"range must be the smallest and the largest stretch, such as 0.7:1.3, not {self.range!r}")
         return self
