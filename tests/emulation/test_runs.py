@@ -79,7 +79,7 @@ def test_a_run_that_fails_is_a_result_and_a_wrong_shape_is_an_error():
     task = ForwardRun(CallableForward(broken), (("C10", 1.0),), tuple(DEPTH), 1)
     assert carry_out(task)["error"] == "ZeroDivisionError: division by zero"
     some = ForwardRun(CallableForward(lambda p: np.where(DEPTH > 0.2, np.nan, 1)), (("C10", 1.0),), tuple(DEPTH), 1)
-    assert "of 15 outputs are not finite" in carry_out(some)["error"]
+    assert "of 15 outputs are not finite, the first at the control " in carry_out(some)["error"]
     with pytest.raises(InputError, match="15 measurements"):
         carry_out(ForwardRun(CallableForward(lambda p: 1.0), (("C10", 1.0),), tuple(DEPTH), 1))
 

@@ -31,6 +31,11 @@ def test_other_texts_are_refused(text):
         candidate_named(text)
 
 
+def test_a_test_in_percent_is_refused():
+    with pytest.raises(tq.InputError, match="110 times the undeformed length: write stretches"):
+        candidate_named("planar 110:130 6")
+
+
 def test_a_test_has_one_control_and_stretches_that_can_be_set():
     with pytest.raises(tq.InputError, match="2 controls"):
         candidate_named("biaxial 1:1.5 8")

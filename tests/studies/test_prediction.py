@@ -233,6 +233,12 @@ def test_texts_say_stretches(text, expected):
     np.testing.assert_allclose(stretches(text, points=3), expected, atol=1e-15)
 
 
+@pytest.mark.parametrize("text", ["110:130", "105, 110"])
+def test_stretches_in_percent_are_refused(text):
+    with pytest.raises(tq.InputError, match="times the undeformed length: write stretches"):
+        stretches(text)
+
+
 @pytest.mark.parametrize("text", ["", "a", "1:", ":2", "2:1", "1:1", "1:2:3", "1,,2", "0.7-2", "nan", "1:inf"])
 def test_other_texts_are_refused(text):
     with pytest.raises(tq.InputError, match="is not a range or list of stretches"):

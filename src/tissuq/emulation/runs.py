@@ -167,7 +167,9 @@ def _checked(outputs: Any, run: ForwardRun) -> dict[str, Any]:
             f"{len(run.control)} measurements, and it must return one output for each."
         )
     if not np.isfinite(values).all():
-        return {"error": f"{np.count_nonzero(~np.isfinite(values))} of {len(values)} outputs are not finite"}
+        bad = np.flatnonzero(~np.isfinite(values))
+        first = f"the first at the control {run.control[bad[0]]:g}"
+        return {"error": f"{len(bad)} of {len(values)} outputs are not finite, {first}"}
     return {"outputs": values.tolist()}
 
 

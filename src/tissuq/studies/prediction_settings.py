@@ -127,6 +127,8 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
     """
     import numpy as np
 
+    from tissuq.experiments.checked_arrays import LARGE_STRETCH
+
     is_range = ":" in text
     try:
         numbers = np.array([float(number) for number in text.split(":" if is_range else ",")])
@@ -136,5 +138,10 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
     if not is_good or not np.isfinite(numbers).all():
         raise InputError(
             f"'{text}' is not a range or list of stretches: write LOW:HIGH as 0.7:2.0, or a list as 1.1,1.2,1.5."
+        )
+    if numbers.min() > LARGE_STRETCH:
+        raise InputError(
+            f"'{text}' begins at {numbers.min():g} times the undeformed length: write stretches as 0.7:2.0, not in "
+            "percent."
         )
     return np.linspace(numbers[0], numbers[-1], points) if is_range else numbers

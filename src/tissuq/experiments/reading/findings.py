@@ -9,6 +9,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from tissuq.experiments.checked_arrays import LARGE_STRETCH
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.cycles import Cycle
@@ -48,8 +49,6 @@ SAME_PEAK = 0.02
 MIN_CONTRACTION = 0.2
 """Smallest strain across over that along the axis, of the other sign, of a specimen that is free there: 0.5 of an
 isotropic one."""
-LARGE_STRETCH = 10.0
-"""Stretch beyond which lengths are likely mistaken."""
 REGION_CODES: Mapping[str, tuple[str, Severity]] = {
     "slack": ("slack", Severity.CAUTION),
     "resolution": ("measurements", Severity.NOTE),  # a fit allows for it
