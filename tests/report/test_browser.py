@@ -149,6 +149,28 @@ def test_loading_and_unloading_are_read_out_apart(tmp_path):
         assert words in page.inner_text(READOUT)
 
 
+def test_small_stresses_are_told_apart_on_the_axis_and_in_words(tmp_path):
+    file = tmp_path / "soft.csv"
+    file.write_text("stretch,stress_MPa\n" + "".join(f"{x},{6e-5 * (x - x**-2)}\n" for x in np.linspace(1, 1.3, 9)))
+    study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 1e-7}], discrepancies=["none"]))
+    folder = tmp_path / "run"
+    folder.mkdir()
+    write_result(specimen_result(study, [file]), folder)
+    with opened(folder / "report.html") as page:
+        assert "measured 4.25e-05, predicted" in page.inner_text(READOUT)
+        page.evaluate("""() => {
+            const draw = CanvasRenderingContext2D.prototype.fillText;
+            window.drawn = [];
+            CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+                window.drawn.push(text);
+                draw.call(this, text, ...place);
+            };
+            window.dispatchEvent(new Event("resize"));
+        }""")
+        page.wait_for_function("window.drawn.length > 0")
+        assert {"1e-05", "2e-05", "3e-05"} <= set(page.evaluate("window.drawn"))
+
+
 def test_a_mode_of_which_a_discrepancy_says_nothing_cannot_be_chosen_beside_it(of_one_test):
     with opened(of_one_test) as page:
         discrepancy, modes = page.locator("#chart select").nth(0), page.locator("#chart select").nth(1)

@@ -20,6 +20,8 @@ Row = dict[str, Any]
 
 MAX_DIGITS = 5
 """Of the ends of an interval: of what is measured, no number is known better."""
+SMALLEST_PLAIN = 1e-4
+"""Below it numbers have an exponent, as `significant` writes them: leading zeros cannot be counted."""
 UNIT = "unit"
 """What rows call the unit of their stresses; without it these are in MPa."""
 
@@ -69,7 +71,7 @@ def _finite(value: Any) -> Any:
 
 
 def significant(value: float | None, digits: int = 3) -> str:
-    """Return a number for people: some significant digits, no exponent where none is needed."""
+    """Return a number for people: some significant digits, an exponent from a million and below 0.0001."""
     if value is None:
         return ""
     text = f"{value:.{digits}g}"
@@ -79,14 +81,18 @@ def significant(value: float | None, digits: int = 3) -> str:
 def interval(low: float, high: float, sd: float) -> tuple[str, str]:
     """Return the ends of an interval with the decimals that its width supports, and at most five digits."""
     decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
-    if decimals > 8:
-        return f"{low:.3g}", f"{high:.3g}"
     largest = max(abs(low), abs(high))
     if 0 < largest < inf:
         decimals = min(decimals, MAX_DIGITS - 1 - floor(log10(largest)))
     low, high = (round(end, decimals) + 0.0 for end in (low, high))  # no minus before a zero
+    if 0 < largest < SMALLEST_PLAIN and sd < SMALLEST_PLAIN:
+        return _with_exponent(low, decimals), _with_exponent(high, decimals)
     shown = max(0, decimals)
     return f"{low:.{shown}f}", f"{high:.{shown}f}"
+
+
+def _with_exponent(number: float, decimals: int) -> str:
+    return f"{number:.{max(0, decimals + floor(log10(abs(number))))}e}" if number else "0"
 
 
 def percent(probability: float | None) -> str:

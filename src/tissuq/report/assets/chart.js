@@ -27,7 +27,9 @@
     parent.append(made);
     return made;
   };
-  const number = value => value == null || !Number.isFinite(value) ? "–" : String(Number(value.toPrecision(3)));
+  // As text elsewhere: an exponent below 0.0001, where leading zeros cannot be counted.
+  const plain = value => (value && Math.abs(value) < 1e-4 ? value.toExponential() : String(value)).replace(/e([+-])(\d)$/, "e$10$2");
+  const number = value => value == null || !Number.isFinite(value) ? "–" : plain(Number(value.toPrecision(3)));
   const isMeasured = key => key === "measured" || key === "unloading";
   const isOn = key => parts.some(part => part.on && part.keys.includes(key));
 
@@ -259,7 +261,7 @@
       width, height: Math.round(Math.min(360, Math.max(220, 0.6 * width))), legend: { show: false },
       pxAlign: 0, cursor: { drag: { x: true, y: true, uni: 20, setScale: false }, bind: { dblclick: () => () => look(null) } },
       scales: { x: { time: false, range: () => zoomed ? zoomed.x : range() }, y: { range: () => zoomed ? zoomed.y : limits() } },
-      axes: [{ label: test.control, labelSize: 22, size: 34 }, { label: `engineering stress [${data.unit}]`, labelSize: 22, size: room }],
+      axes: [{ label: test.control, labelSize: 22, size: 34 }, { label: `engineering stress [${data.unit}]`, labelSize: 22, size: room, values: (_, places) => places.map(place => plain(Number(place.toPrecision(6)))) }],
       series: [{}, ...keys.map(series)],
       bands: parts.filter(part => part.fill && test.is_curve).map(part => ({ series: [position(part.keys[1]), position(part.keys[0])], fill: part.fill })),
       hooks: {
