@@ -151,7 +151,7 @@ def test_verbose_tells_how_long_reading_a_run_took(cli, specimen, monkeypatch):
 def test_quiet_leaves_the_json_of_a_run_and_prints_the_numbers_of_a_comparison_alone(cli, specimen):
     assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
     assert cli("show", "run", "--json", "--quiet").out == cli("show", "run", "--json").out
-    loud, quiet = cli("compare", "run").out, cli("compare", "run", "--quiet")
+    loud, quiet = cli("compare", "run").out, cli("compare", "run", "-q")
     assert quiet.status == 0
     assert [line for line in quiet.out.splitlines() if line.partition(": ")[0] not in " ".join(loud.split())] == []
     assert 0 < len(quiet.out.splitlines()) < len(loud.splitlines())

@@ -106,7 +106,8 @@ def _parameter(slot: Slot) -> Parameter:
     else:
         negative = slot.option.negative or ("no-" + slot.name if slot.info.default is True else "")
         names = "/".join(f"--{name.replace('_', '-')}" for name in (slot.name, negative) if name)
-        kind = typer.Option(names, help=slot.help, rich_help_panel=slot.option.group or None)
+        letters = [f"-{slot.option.letter}"] if slot.option.letter else []
+        kind = typer.Option(names, *letters, help=slot.help, rich_help_panel=slot.option.group or None)
     reads = slot.reads if slot.is_required else slot.reads | None
     default = Parameter.empty if slot.is_required else None
     return Parameter(slot.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[reads, kind])

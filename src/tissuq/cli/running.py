@@ -18,7 +18,7 @@ class Running(Settings):
 class Verbosity(Running):
     """A command that says as much as is asked for."""
 
-    quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.")
+    quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.", letter="q")
     verbose: bool = option(False, "Tell how long every stage took.")
 
 

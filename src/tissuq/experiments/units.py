@@ -82,7 +82,7 @@ class StressUnit:
     Parameters
     ----------
     name : str
-        The unit as the user wrote it.
+        The unit as the user wrote it, pascals with the capitals of the SI.
     to_mpa : float
         Number of MPa in one such unit.
     """
@@ -115,8 +115,8 @@ def stress_unit(text: str) -> StressUnit:
 
     Examples
     --------
-    >>> stress_unit("kPa").to_mpa
-    0.001
+    >>> stress_unit("kpa")
+    StressUnit(name='kPa', to_mpa=0.001)
     >>> stress_unit("N/mm²")
     StressUnit(name='N/mm²', to_mpa=1.0)
     >>> stress_unit("10^-2 MPa").to_mpa
@@ -132,7 +132,7 @@ def stress_unit(text: str) -> StressUnit:
     if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
     factor = COMMON_STRESS_UNITS.get(compact)
-    return StressUnit(name, stress_factor(in_latin(name)) if factor is None else factor)
+    return StressUnit(PASCALS.get(name.lower(), name), stress_factor(in_latin(name)) if factor is None else factor)
 
 
 def _without_power(unit: str) -> tuple[float, str]:

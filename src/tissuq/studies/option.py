@@ -44,6 +44,8 @@ class Option:
         As it is typed, without the dashes, where that is not the name of the setting.
     negative : str
         What a flag is called that says no.
+    letter : str
+        That stands for its name after one dash.
     unit : str
         Of its number.
     takes : type, optional
@@ -69,6 +71,7 @@ class Option:
     help: str
     name: str = ""
     negative: str = ""
+    letter: str = ""
     unit: str = ""
     takes: Any = None
     parse: Callable[[Any], Any] | None = None
@@ -120,6 +123,7 @@ def option(
     *,
     name: str = "",
     negative: str = "",
+    letter: str = "",
     unit: str = "",
     takes: Any = None,
     parse: Callable[[Any], Any] | None = None,
@@ -143,7 +147,20 @@ def option(
     (64, ['Number of draws [64].'])
     """
     declared = Option(
-        help, name, negative, unit, takes, parse, choices, entry, entries or {}, of, renamed or {}, group, is_argument
+        help,
+        name,
+        negative,
+        letter,
+        unit,
+        takes,
+        parse,
+        choices,
+        entry,
+        entries or {},
+        of,
+        renamed or {},
+        group,
+        is_argument,
     )
     start = {"default": default} if default_factory is None else {"default_factory": default_factory}
     return Field(**start, description=help or None, json_schema_extra=declared, **limits)
