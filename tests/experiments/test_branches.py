@@ -25,6 +25,7 @@ def test_a_cycle_through_rest_comes_back_to_it_and_goes_on_in_compression():
         np.linspace(0.8, 1.3, 20),  # from compression through rest: no way back is known as such
         np.concatenate([UP, UP]),  # two tests beneath one another
         np.concatenate([np.linspace(0.8, 1.3, 12)] * 2),
+        np.concatenate([UP, np.linspace(1.0, 0.8, 10)]),  # tension, and beneath it compression from rest
         np.random.default_rng(3).permutation(np.linspace(1.0, 1.3, 30)),
         np.column_stack([UP, UP]),
         [1.0, 1.1, 1.0],

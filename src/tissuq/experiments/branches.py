@@ -10,7 +10,8 @@ __all__ = ["turning_points", "unloading"]
 REVERSAL = 0.1
 """Share of the range of stretches by which a test must go back for a new branch to begin."""
 FEWEST = 4
-"""Measurements of a branch, and of the one before it, that make it one of unloading: rows may be in any order."""
+"""Measurements of the way there, and of that back, that make it unloading: rows may be in any order, and another test
+may begin at rest."""
 
 
 def turning_points(stretch: ArrayLike) -> list[int]:
@@ -53,5 +54,6 @@ def unloading(points: ArrayLike, reference: ArrayLike) -> NDArray[np.bool_]:
         if start - previous >= FEWEST and stop - start >= FEWEST:
             rows = np.arange(start + 1, stop + 1)
             way = np.sign(values[stop] - values[start])
-            is_back[rows] = way * (values[rows] - float(np.asarray(reference))) <= 0
+            goes_back = way * (values[rows] - float(np.asarray(reference))) <= 0
+            is_back[rows] = goes_back & (goes_back.sum() >= FEWEST)
     return is_back
