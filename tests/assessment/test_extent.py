@@ -113,7 +113,10 @@ def test_sentences_say_no_more_than_there_is(data, discrepancy):
     [
         (np.linspace(1.05, 2, 20), ["tension only"]),
         (np.linspace(0.5, 0.98, 20), ["compression only"]),
-        (np.concatenate([np.linspace(0.5, 0.7, 10), np.linspace(1.5, 2, 10)]), ["near the reference"]),
+        (
+            np.concatenate([np.linspace(0.5, 0.7, 10), np.linspace(1.5, 2, 10)]),
+            ["nothing is measured between stretch 1 and 0.7"],
+        ),
         (np.linspace(0.7, 1.4, 7), ["7 measurements"]),
         (np.linspace(0.7, 1.4, 30), []),
     ],
@@ -133,8 +136,8 @@ def test_the_design_of_a_shear_test_is_judged_by_its_amounts_of_shear():
     )
     assert list(measurement_warnings(near)) == []
     (found,) = measurement_warnings(far)
-    assert "the nearest amount of shear is 0.2" in found
-    assert "of amount of shear 0." in found
+    assert "between amount of shear 0 and 0.2" in found
+    assert "of amount of shear 0, beside it." in found
 
 
 def test_a_parameter_that_is_not_linear_is_assessed_too(data):

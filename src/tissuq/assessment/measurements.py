@@ -38,9 +38,9 @@ def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
         control = experiment.curves[0].mode.controls[0]
         nearest = control.reference + strain[np.abs(strain) > 0][np.abs(strain[np.abs(strain) > 0]).argmin()]
         yield ResultWarning(
-            f"nothing is measured near the reference (the nearest {control.name} is {nearest:.4g}), so the initial "
+            f"nothing is measured between {control.name} {control.reference:g} and {nearest:.4g}, so the initial "
             f"modulus is extrapolated: measure within {NEAR_STRAIN_SHARE * reach:.2g} of {control.name} "
-            f"{control.reference:g}.",
+            f"{control.reference:g}, beside it.",
             "not-near-reference",
         )
     if not experiment.shows_direction and any(test.shows_direction for test in experiment.tests):

@@ -109,7 +109,7 @@ def _reporting(
     if "prior-dominates" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
     if "not-near-reference" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
+        return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
     if "measurements" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
     model = solution.model

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
-from tissuq.assessment.measurements import labels_of_tests, measurement_warnings
+from tissuq.assessment.measurements import labels_of_tests
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
@@ -126,16 +126,9 @@ def warnings_about(
     low, high = solution.marginals[headline].hdi()
     if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
         simpler = ", or fit a law with fewer parameters" if len(solution.model.material_symbols) > 1 else ""
-        of_test = measurement_warnings(solution.model.experiment) if solution.is_of_data else []
-        is_spoilt = any(warning.severity is not Severity.NOTE for warning in of_test)
-        first = (
-            "See to the other warnings first, which may be the reason; if it stays so, measure"
-            if is_spoilt
-            else "Measure"
-        )
         yield ResultWarning(
-            f"the data determine {headline} poorly: its 95 % interval is wider than its median. {first} more points, "
-            f"nearer to stretch 1, or with less noise{simpler}.",
+            f"the data determine {headline} poorly: its 95 % interval is wider than its median. Unless another warning "
+            f"says why, measure more points, nearer to stretch 1, or with less noise{simpler}.",
             "poorly-determined",
         )
     if cut:
