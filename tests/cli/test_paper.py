@@ -114,7 +114,7 @@ def test_run_toml_holds_the_options_that_were_given(paper_run):
 def test_the_table_in_the_terminal_fits_80_columns_and_says_where_the_report_lies(paper_run):
     _, said = paper_run
     assert said.err == ""
-    table = said.out[said.out.index(" discrepancy ") : said.out.index("HPD: 95 %. In band, alone: ")].splitlines()
+    table = said.out[said.out.index(" discrepancy ") : said.out.index("Intervals are the shortest")].splitlines()
     assert max(map(len, table)) <= 80
     assert [line.split()[0] for line in table if line.split() and line.split()[0] in FORMULATIONS] == FORMULATIONS
     assert "Report: run/report.html" in said.out

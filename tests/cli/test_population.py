@@ -147,6 +147,9 @@ def test_the_numbers_are_those_of_the_specimens(population_run):
     assert found["new patient"]["hdi_low"] < 40
     assert found["new patient"]["hdi_high"] > 75
     assert 0.1 < found["spread"]["median"] < 0.6  # of the logarithm, which has no unit
+    shown = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["numbers"][2]
+    assert shown["name"] == "spread between specimens, as a factor"
+    assert shown["value"] == pytest.approx(np.exp(found["spread"]["median"]))
     units = [row["unit"] for row in table(folder / "run" / "population.csv")]
     assert units == ["kPa", "", "kPa", "kPa"]
     own = [float(row["median"]) for row in table(folder / "run" / "specimens.csv")]
@@ -169,6 +172,19 @@ def test_specimens_have_noises_of_their_own(here):
     drawn = found.patient.solution.mixture.settings[:, 0]  # of a random specimen, five of six of which are known
     is_known = np.isclose(drawn[:, None], [known[name].sd({}, 0.0) for name in noises], rtol=1e-9).any(axis=1)
     assert is_known.mean() == pytest.approx(5 / 6, abs=0.02)
+
+
+@pytest.mark.slow
+def test_specimens_that_differ_by_orders_of_magnitude_are_looked_into_first(cli, here):
+    moduli, errors = (0.2, 0.9, 3, 10, 40, 160), np.random.default_rng(3).normal(1, 0.02, (6, len(STRETCH)))
+    rows = [
+        f"S{k},{x},{moduli[k] * (x - x**-2) * error}"
+        for k, of_specimen in enumerate(errors)
+        for x, error in zip(STRETCH, of_specimen, strict=True)
+    ]
+    (here / "all.csv").write_text("\n".join(["specimen,stretch,stress_kPa", *rows]) + "\n")
+    said = cli("population", "all.csv", "--specimen-column", "specimen", *OPTIONS[:2], "--no-figures", "--out", "run")
+    assert "find out why the specimens differ so much" in " ".join(said.out.split())
 
 
 @pytest.mark.slow

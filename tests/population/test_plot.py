@@ -90,3 +90,26 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
     complete = [line for line in axis.lines if line.get_marker() == "D"]
     assert [line.get_xdata().item() for line in complete] == [0.5]  # seen however narrow its interval
     plt.close("all")
+
+
+def test_specimens_that_differ_by_orders_of_magnitude_are_on_a_logarithmic_axis():
+    import pandas as pd
+
+    ends = ["median", "hdi_low", "hdi_high"]
+    rows = {name: [5.0, 0.1, 200.0] for name in ("median", "spread", "new patient", "complete pooling")}
+    summary = pd.DataFrame.from_dict({("C10", name): row for name, row in rows.items()}, "index", columns=ends)
+    summary.index = pd.MultiIndex.from_tuples(summary.index)
+    specimens = pd.DataFrame.from_dict(
+        {(f"S{m}", "C10"): [m, 0.99 * m, 1.01 * m] * 2 for m in (0.2, 0.9, 3.1, 10.0, 41.0, 160.0)},
+        "index", columns=[*ends, *(f"alone_{end}" for end in ends)],
+    )  # fmt: skip
+    specimens.index = pd.MultiIndex.from_tuples(specimens.index)
+    with panels(plt.subplots()[1], 1) as drawn:
+        draw_specimens(drawn, summary, specimens, {"C10": "kPa"})
+    (axis,) = drawn.axes
+    low, high = axis.get_xlim()
+    assert axis.get_xscale() == "log"
+    assert 0 < low < 0.2 < 160 < high
+    assert not axis.texts  # nothing is outside
+    assert {line.get_marker() for line in axis.lines} == {"None", "|", "D"}  # ticks hide no bar
+    plt.close("all")

@@ -221,7 +221,7 @@ def test_parameters_are_densities_with_priors_and_intervals_in_the_unit(posterio
     modulus, c10 = posterior.plot_parameters()
     assert (modulus.get_xlabel(), c10.get_xlabel()) == ("initial shear modulus [kPa]", "C10 [kPa]")
     marginal, labelled = posterior.marginals["C10"], by_label(c10)
-    np.testing.assert_allclose(labelled["median and 95 % HPD"].get_xdata(), 1000 * np.array(marginal.hdi()))
+    np.testing.assert_allclose(labelled["median and 95 % interval"].get_xdata(), 1000 * np.array(marginal.hdi()))
     at, low, high = ends_of(labelled["posterior"])
     np.testing.assert_allclose(high, marginal.pdf(at / 1000) / 1000, atol=1e-12)
     assert not low.any()

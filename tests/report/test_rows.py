@@ -56,7 +56,7 @@ def test_an_interval_is_shown_to_two_digits_of_the_sd_and_five_at_most(low, high
 
 def test_a_summary_is_rounded_alike_in_the_unit_of_the_file():
     table = summary_table([ROW], StressUnit("kPa", 1e-3), "title")
-    assert table.headers[:4] == ["discrepancy", "C10, kPa", "sd", "95 % HPD"]
+    assert table.headers[:4] == ["discrepancy", "C10, kPa", "sd", "95 % interval"]
     assert table.rows[0][:4] == ["none", "1235", "30", "[1175, 1294]"]
     table = summary_table([ROW], StressUnit("MPa", 1.0), "title")
     assert table.headers[4:] == ["truth", "log ev.", "in band", "alone"]

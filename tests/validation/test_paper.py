@@ -29,7 +29,7 @@ def verdict(study, words):
         "Without model uncertainty the predictive band misses the data",
         "The quadratic form passes the predictive check (eq. 27) and yet misses C10",
         "The gp form passes the predictive check (eq. 27) and yet misses C10",
-        "With the Yeoh mean the 95 % HPD of C10 contains the true value",
+        "With the Yeoh mean the 95 % interval of C10 contains the true value",
         "does not describe the data: quadratic",
         "does not describe the data: yeoh",
         "does not describe the data: gp",

@@ -24,6 +24,7 @@ __all__ = ["NOTABLE_SHARE", "Answer", "Estimate", "answer_of"]
 
 NOTABLE_SHARE = 0.05
 """Of the stress, from which the discrepancy is worth a word."""
+TOGETHER = "Use it with the discrepancy, as exported cards do."
 
 
 class Estimate(NamedTuple):
@@ -124,21 +125,18 @@ def _law_in_words(solution: Solution, has_stress_at_rest: bool) -> str:
     if has_stress_at_rest:
         return f"There is stress at rest, so that it cannot be said how far {law} alone is off."
     if mean <= PRECISE:
-        return f"{law} alone is off by {mean:.0%} of the stress: use it with the discrepancy, as exports do."
+        return f"{law} alone is off by {mean:.0%} of the stress. {TOGETHER}"
     if high < 1:
         return (
             f"{law} alone is wrong here: the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to "
-            f"{high:.0%})."
+            f"{high:.0%}). {TOGETHER}"
         )
     if low > 1:
         return (
             f"{law} alone is wrong here: the discrepancy opposes it with {mean:.0%} of the stress (95 % interval "
-            f"{low:.0%} to {high:.0%})."
+            f"{low:.0%} to {high:.0%}). {TOGETHER}"
         )
-    return (
-        f"How much of the stress is {law}'s and how much the discrepancy's is not determined: use both together, as "
-        "exports do."
-    )
+    return f"How much of the stress is {law}'s and how much the discrepancy's is not determined. {TOGETHER}"
 
 
 def _estimate(name: str, marginal: Marginal) -> Estimate:

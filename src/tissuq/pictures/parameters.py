@@ -70,7 +70,7 @@ def marginals(solution: Solution, drawn: Panels, names: Sequence[str], unit: Str
             line(axis, prior_values / factor, prior_height * factor, color=BASE, style=":", width=1.4, label="prior")
         low, high = (end / factor for end in marginal.hdi(prob))
         middle = float(marginal.quantile(0.5)) / factor
-        interval = f"median and {100 * prob:.4g} % HPD"
+        interval = f"median and {100 * prob:.4g} % interval"
         forest(axis, [0.0], [low], [middle], [high], width=4, mark_color=INK, label=interval)
         axis.set_ylim(-0.04 * top, 1.1 * top)
         axis.set_yticks([])
@@ -94,7 +94,7 @@ def ridges(
     Those whose interval misses the true value are grey.
     """
     levels, size = rows(axis, list(solutions)), relative_size()
-    words = "posterior density", f"{100 * prob:.4g} % HPD", "median"
+    words = "posterior density", f"{100 * prob:.4g} % interval", "median"
     for level, solution in zip(levels, solutions.values(), strict=True):
         factor, label = _scale(solution, name, unit)
         marginal = marginal_of(solution, name)

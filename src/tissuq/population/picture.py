@@ -25,6 +25,10 @@ ENDS = ("hdi_low", "hdi_high")
 COLUMNS = [f"{prefix}{name}" for prefix in ("", "alone_") for name in ("median", *ENDS)]
 FENCE = 3.0
 """Quartile ranges beyond the quartiles of the medians from which a specimen need not be within the axis."""
+DECADES = 300.0
+"""Ratio of the ends of a logarithmic axis from which it has a number a decade."""
+FAR_APART = 4.0
+"""Ratio of the quartiles of the medians from which the axis is logarithmic."""
 SMALL_MARKS_ABOVE = 25
 """Number of specimens above which names and marks are smaller."""
 
@@ -51,9 +55,8 @@ def draw_specimens(
         panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label=words)
         panel.plot([float(np.mean(complete))], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
         _draw_specimens(panel, estimates, small)
-        panel.set_xlim(*_limits(estimates, [*new, *median, *complete]))
+        _set_axis(panel, estimates, np.array([*new, *median, *complete]))
         _say_what_is_outside(panel, estimates, new)
-        panel.locator_params(axis="x", nbins=6)
         panel.set_xlabel(f"{symbol} [{unit}]" if unit else symbol)
         labels = order if number % drawn.columns == 0 else [""] * len(order)
         panel.set_yticks(range(len(order)), labels, fontsize=(6.5 if small else 9) * size)
@@ -72,13 +75,29 @@ def numbers_of(table: pd.DataFrame) -> dict[Any, dict[str, float]]:
     return {index: {str(name): float(value) for name, value in row.items()} for index, row in table.T.to_dict().items()}
 
 
-def _limits(estimates: Mapping[str, FloatArray], new: list[float]) -> tuple[float, float]:
+def _set_axis(axis: Axes, estimates: Mapping[str, FloatArray], bands: FloatArray) -> None:
+    """Set an axis for the specimens, logarithmic where they, all positive, differ by orders of magnitude."""
+    from matplotlib.ticker import LogLocator
+
+    lower, upper = np.quantile(estimates["median"], [0.25, 0.75])
+    if min(bands.min(), *(values.min() for values in estimates.values())) > 0 and upper > FAR_APART * lower:
+        low, high = np.exp(_limits({name: np.log(values) for name, values in estimates.items()}, np.log(bands)))
+        axis.set_xscale("log", subs=[])
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high / low > DECADES else (1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.set_xlim(low, high)
+    else:
+        axis.set_xlim(*_limits(estimates, bands))
+        axis.locator_params(axis="x", nbins=6)
+
+
+def _limits(estimates: Mapping[str, FloatArray], bands: FloatArray) -> tuple[float, float]:
     """Return the ends of an axis for the specimens that are not far from the rest; others may run out."""
     lower, upper = np.quantile(estimates["median"], [0.25, 0.75])
     reach = FENCE * (upper - lower)
     near = (estimates["median"] >= lower - reach) & (estimates["median"] <= upper + reach)
     ends = [estimates[f"{prefix}{end}"][near] for prefix in ("", "alone_") for end in ENDS]
-    return limits_of([estimates["median"][near]], [*ends, new], margin=1.0)
+    return limits_of([estimates["median"][near]], [*ends, bands], margin=1.0)
 
 
 def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float]) -> None:
@@ -92,8 +111,8 @@ def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: l
                 (">", "right", 0.985, -0.025) if median > high else ("<", "left", 0.015, 0.025)
             )
             axis.plot([position], [level], mark, ms=4 * relative_size(), **looks)
-            axis.text(position + inward, level, f"{median:.2g} [{start:.2g}, {end:.2g}]", ha=side, **words)
-    cut_ends = [f"{word} {end:.2g}" for word, end, is_beyond in zip(
+            axis.text(position + inward, level, f"{median:.3g} [{start:.3g}, {end:.3g}]", ha=side, **words)
+    cut_ends = [f"{word} {end:.3g}" for word, end, is_beyond in zip(
         ("from", "to"), new, (new[0] < low, new[1] > high), strict=True) if is_beyond]  # fmt: skip
     if cut_ends:
         axis.text(0.985, -0.55, f"a new specimen: {' '.join(cut_ends)}", ha="right", **words)
@@ -101,11 +120,11 @@ def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: l
 
 def _draw_specimens(axis: Axes, estimates: Mapping[str, FloatArray], small: bool) -> None:
     heights = np.arange(len(estimates["median"]))
-    gap, width, size = (0.18, 1.6, 2.5) if small else (0.16, 2.6, 3.5)
+    gap, width, size = (0.18, 1.6, 4.0) if small else (0.16, 2.6, 8.0)
     for prefix, side, color, dot, label in (
-        ("alone_", gap, ALONE, BASE, "specimen by itself, 95 % HPD"),
-        ("", -gap, BAND, INK, "within the population, 95 % HPD"),
+        ("alone_", gap, ALONE, BASE, "specimen by itself, 95 % interval"),
+        ("", -gap, BAND, INK, "within the population, 95 % interval"),
     ):
         low, middle, high = (estimates[f"{prefix}{name}"] for name in ("hdi_low", "median", "hdi_high"))
-        forest(axis, heights + side, low, middle, high, color=color, width=width, size=size, mark_color=dot,
-               label=label)  # fmt: skip
+        forest(axis, heights + side, low, middle, high, color=color, width=width, mark="|", size=size,
+               mark_color=dot, label=label)  # fmt: skip

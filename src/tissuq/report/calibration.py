@@ -27,7 +27,8 @@ __all__ = ["HEADERS", "calibration_result", "readable_calibration"]
 LARGE_SHARE = 0.1
 """Share of the variance of a parameter that is due to the emulator, beyond which more runs are worth while."""
 BY_EMULATOR = (
-    "HPD: highest-density interval. By emulator: share of the posterior variance caused by the error of the emulator."
+    "Intervals are the shortest that hold 95 %. By emulator: share of the posterior variance caused by the error of "
+    "the emulator."
 )
 EMULATOR = (
     "A Gaussian process replaces the model: its prediction and the variance of its error are part of the likelihood. "
@@ -41,7 +42,7 @@ SOBOL = (
     "Share of the variance of the outputs, where all parameters vary over their priors, that a parameter explains "
     "alone (first) and with its interactions (total): Sobol's indices from the emulator."
 )
-HEADERS = ["parameter", "mean", "sd", "95 % HPD", "ESS", "by emulator"]
+HEADERS = ["parameter", "mean", "sd", "95 % interval", "ESS", "by emulator"]
 """Of `readable_calibration`."""
 
 
@@ -64,7 +65,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     inside_alone = calibration.predictive_coverage(discrepancy=False)
     remark = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
     numbers = [
-        Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""), interval_is="95 % HPD")
+        Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""))
         for symbol, marginal in calibration.marginals.items()
         if symbol in calibration.problem.forward_symbols
     ]
@@ -265,7 +266,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     )  # fmt: skip
     marginals = Picture(
         "marginals", lambda: marginals_figure(study), "Marginal posteriors",
-        "Blue: marginal posterior and its 95 % HPD. Dashed: without the error of the emulator. Dotted: prior.",
+        "Blue: marginal posterior and its 95 % interval. Dashed: without the error of the emulator. Dotted: prior.",
     )  # fmt: skip
     inside_alone = (
         f", and {100 * calibration.predictive_coverage(discrepancy=False):.0f} % inside that of the forward model alone"

@@ -147,7 +147,7 @@ def comparison_result(table: pd.DataFrame, runs: list[str], unit: StressUnit) ->
     figure = Picture("comparison", lambda: comparison_figure(table, unit),
                      "Evidence, prediction and parameter of every fit", caption)  # fmt: skip
     answer = Picture("answer", lambda: _parameter_figure(table, unit), "The parameter of every fit",
-                     "95 % HPD and median of the parameter; the fit with the largest evidence is on top.")  # fmt: skip
+                     "95 % interval and median of the parameter; that of the largest evidence is on top.")  # fmt: skip
     excluding = (
         "Where the intervals of the parameter exclude each other, the choice of discrepancy matters more than the "
         "noise: read what each fit's own report says of its share of the initial stiffness."
@@ -237,7 +237,7 @@ def _intervals(axis: Axes, levels: Any, table: pd.DataFrame, unit: StressUnit) -
     """Draw the 95 % interval and the median of the headline parameter of every fit."""
     names = table["parameter"].dropna().unique()
     axis.set_title("Parameter" if len(names) != 1 else str(names[0]))
-    axis.set_xlabel(f"{' or '.join(names)} [{unit.name}]\n(95 % HPD and median)")
+    axis.set_xlabel(f"{' or '.join(names)} [{unit.name}]\n(95 % interval and median)")
     for level, (_, row) in zip(levels, table.iterrows(), strict=True):
         low, median, high = (float(row[name]) / unit.to_mpa for name in ("hdi_low", "median", "hdi_high"))
         forest(axis, [level], [low], [median], [high], width=4, strength=0.55, mark_color=INK)

@@ -130,7 +130,7 @@ def predictive_figure(
 def marginal_figure(
     posteriors: Mapping[str, Posterior], symbol: str, unit: StressUnit, truth: float | None = None, width: float = 8.2
 ) -> Figure:
-    """Return the marginal posteriors of one stress parameter, a row a formulation, with 95 % HPD and true value."""
+    """Return the marginal posteriors of one stress parameter, a row a formulation, with interval and true value."""
     with new_figure(width, 0.62 * len(posteriors) + 1.4) as figure:
         solutions = {name: posterior.solution for name, posterior in posteriors.items()}
         axis = figure.subplots()

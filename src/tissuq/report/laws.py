@@ -45,7 +45,7 @@ HOW_TO_READ = (
     "To continue with one law: tissuq predict, export or design with this folder and --material LAW.",
 )
 HEADERS = [
-    "law", "modulus", "95 % HPD", "parameters", "probability", "elpd minus best", "R2 alone", "error alone",
+    "law", "modulus", "95 % interval", "parameters", "probability", "elpd minus best", "R2 alone", "error alone",
     "share of discrepancy", "stable / 50 % beyond",
 ]  # fmt: skip
 
@@ -64,7 +64,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     }
     discrepancy = settings.discrepancies[0]
     caption = (
-        f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % HPD, and the "
+        f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % interval, and the "
         "average by the laws' probabilities."
     )
     law = study.recommended
@@ -162,8 +162,8 @@ def law_lead(study: LawStudy) -> str:
     ]
     mean = significant(modulus.mean / unit.to_mpa)
     return (
-        f"The initial shear modulus, averaged over the laws, has the mean {mean} {unit.name}, 95 % HPD {low} to {high} "
-        f"{unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
+        f"The initial shear modulus, averaged over the laws, has the mean {mean} {unit.name}, 95 % interval {low} to "
+        f"{high} {unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
         f"{comparison_words[0].upper()}{comparison_words[1:]}." + "".join(misfit_words)
     )
 
@@ -182,7 +182,7 @@ def _though(probability: Any) -> str:
 
 
 def modulus_figure(study: LawStudy) -> Figure:
-    """Return the moduli of all laws with 95 % HPD, and their average."""
+    """Return the moduli of all laws with 95 % interval, and their average."""
     with new_figure(ANSWER_WIDTH, 0.34 * (len(study.comparison.fits) + 1) + 1.0) as figure:
         study.comparison.plot(figure.subplots(), unit=study.unit.name)
     return figure

@@ -49,8 +49,8 @@ PAGES = {
 }
 """Title of each group, and what it shows."""
 FIGURE_7 = (
-    "Figure 7 (numbered as in the paper). Marginal posteriors of C10: density (each to its own scale), 95 % HPD (bar) "
-    "and median (dot). Blue: the interval holds the true value; grey: it does not."
+    "Figure 7 (numbered as in the paper). Marginal posteriors of C10: density (each to its own scale), 95 % interval "
+    "(bar) and median (dot). Blue: the interval holds the true value; grey: it does not."
 )
 NOTE = (
     "The log evidence is that of the data in MPa with respect to the normalised priors, uniform densities "
@@ -106,7 +106,7 @@ def _numbers(summary: list[Row], held: list[str], passed: list[str]) -> tuple[Nu
     if weighed:
         row = max(weighed, key=lambda row: float(row["log_evidence"]))
         mean, low, high = (float(row[f"C10_{name}"]) for name in ("mean", "hdi_low", "hdi_high"))
-        number = Number("", mean, low, high, "MPa", "95 % HPD")
+        number = Number("", mean, low, high, "MPa")
         numbers.append(
             Number("preferred by the evidence", str(row["formulation"]), remark=f"C10 {number.text}, {number.beside}")
         )
@@ -194,9 +194,9 @@ def _ranges(study: PaperStudy) -> tuple[Block, ...]:
     cells, replicates = _cells(study), study.settings.replicates
     times = "Whether" if replicates == 1 else f"In how many of {replicates} data sets"
     words = (
-        f"{times} the 95 % HPD holds the true C10, for several stretch ranges, and for the process with its amplitude "
-        "c uniform up to 1 or up to 10 MPa. The ranking changes with the range, and the verdict on the process with "
-        "its prior box; a reader of the paper should not take either as a property of the formulation."
+        f"{times} the 95 % interval holds the true C10, for several stretch ranges, and for the process with its "
+        "amplitude c uniform up to 1 or up to 10 MPa. The ranking changes with the range, and the verdict on the "
+        "process with its prior box; a reader of the paper should not take either as a property of the formulation."
     )
     return words, cells
 

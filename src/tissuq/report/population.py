@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import exp
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,9 +43,9 @@ PATIENT = "new-patient"
 ENDS = ("hdi_low", "hdi_high")
 NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of specimens."
 SPECIMENS = (
-    "Every specimen by itself (grey) and within the population (blue): 95 % HPD and median. Bands: 95 % for a new "
-    "specimen, and for the median of the population. At the bottom, complete pooling. Bars may run out of the panel; "
-    "where the median of a specimen does, it stands at the edge with its interval."
+    "Every specimen by itself (grey) and within the population (blue): 95 % interval and median (tick). Bands: 95 % "
+    "for a new specimen, and for the median of the population. At the bottom, complete pooling. Bars may run out of "
+    "the panel; where the median of a specimen does, it stands at the edge with its interval."
 )
 AS_TESTED = (
     " Intervals of single specimens are as tested: errors of their tests, such as slack or area, count as differences "
@@ -65,13 +66,15 @@ HOW_TO_READ = (
     "The specimens' model errors are taken to be independent, unless the discrepancy is shared. An error that all of "
     "them share (the same missing physics) does not average out: with --shared-discrepancy it is included in the "
     "intervals of the population median and of a new specimen.",
-    "The spread of a positive parameter is the sd of its logarithm: 0.3 means that two thirds of specimens lie within "
-    "about ± 30 % of the median.",
+    "The spread of a positive parameter is a factor: two of three specimens lie between the median divided by it and "
+    "the median times it. Files have its logarithm, the sd of the parameter's logarithm.",
 )
 POINTS = 81
 """Of the stress of a new specimen."""
-HEADERS = ["parameter", "unit", "quantity", "median", "95 % HPD"]
+HEADERS = ["parameter", "unit", "quantity", "median", "95 % interval"]
 """Of `readable_population`."""
+WIDE_SPREAD = 1.0
+"""Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
 QUANTITIES = {
     "median": "median of the population",
     "spread": "spread between specimens",
@@ -132,6 +135,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
 
 def _next_step(population: Population, warnings: Sequence[str], already_without: Sequence[str] = ()) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
+    symbol = population.symbols[0]
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
     if _has(warnings, "doubtful-reading"):
@@ -141,6 +145,11 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
         return (
             f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
+        )
+    if population.coordinates.is_log[0] and population.summary()["median"][symbol, "spread"] > WIDE_SPREAD:
+        return (
+            "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
+            "compute with a new one"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
@@ -180,11 +189,12 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
         median, low, high = (table[symbol, quantity][end] / divisor for end in ("median", *ENDS))
         return Number(name, median, low, high, unit)
 
-    spread = "spread between specimens" + (" (sd of the logarithm)" if is_log else "")
+    spread = "spread between specimens" + (", as a factor" if is_log else "")
+    middle, low, high = (exp(table[symbol, "spread"][end]) for end in ("median", *ENDS))
     return (
         number(f"{words} of a new specimen{patient_in_words(study)}", "new patient", factor / times, unit),
         number(f"{words}, median of the population", "median", factor / times, unit),
-        number(spread, "spread", 1.0 if is_log else factor / times, "" if is_log else unit),
+        Number(spread, middle, low, high) if is_log else number(spread, "spread", factor / times, unit),
     )
 
 
@@ -199,7 +209,7 @@ def _sections(
         "Parameters of every specimen by itself and within the population", _about_specimens(population),
         is_one,
     )  # fmt: skip
-    headers = ["specimen", "parameter", "unit", "by itself", "95 % HPD", "within the population", "95 % HPD"]
+    headers = ["specimen", "parameter", "unit", "by itself", "95 % interval", "within the population", "95 % interval"]
     sections = [Section("Every specimen", (specimens, Table(headers, _readable_specimens(study), text_columns=(1, 2))))]
     patient: list[Any] = [f"Not predicted: {reason}" for reason in not_predicted]
     if bands:
@@ -213,7 +223,7 @@ def _sections(
         sections.append(Section("Stress of a new specimen", tuple(patient)))
     pairs = [[str(name), *_text(numbers)] for name, numbers in numbers_of(population.correlations()).items()]
     if pairs:
-        table = Table(["parameters", "correlation between specimens", "95 % HPD"], pairs)
+        table = Table(["parameters", "correlation between specimens", "95 % interval"], pairs)
         sections.append(Section("Correlations", (table,)))
     logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
     linear = [symbol for symbol in population.symbols if symbol not in logs]
@@ -317,8 +327,12 @@ def readable_population(study: PopulationStudy) -> list[list[str]]:
         factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
             is_ratio = quantity == "spread" and is_log
-            cells = _text(table[symbol, quantity], 1.0 if is_ratio else factor)
-            rows.append([symbol, "sd of the log" if is_ratio else unit, words, *cells])
+            numbers = table[symbol, quantity]
+            if is_ratio:
+                cells = _text({name: exp(number) for name, number in numbers.items()})
+            else:
+                cells = _text(numbers, factor)
+            rows.append([symbol, "factor" if is_ratio else unit, words, *cells])
     return rows
 
 
@@ -351,7 +365,7 @@ def _lead(study: PopulationStudy) -> str:
     factor, unit = _scale(study, symbol)
     factor, quantity = factor / times, symbol if words == symbol else f"the {words}"
     table = numbers_of(study.population.summary(unit="MPa"))
-    middle = significant(table[symbol, "median"]["median"] / factor)
+    middle, _ = _text(table[symbol, "median"], factor)
     new, complete = (
         _text(table[symbol, name], factor)[1].strip("[]").replace(",", " to")
         for name in ("new patient", "complete pooling")
@@ -381,5 +395,5 @@ def _about_law(population: Population, warnings: Sequence[str]) -> str:
     law = population.complete.model.material.name
     return (
         f" {law} alone is wrong here: the discrepancy carries {share:.0%} of the stress "
-        "(median of the specimens). Use it with the discrepancy, as exports do, or fit another law."
+        "(median of the specimens). Use it with the discrepancy, as exported cards do, or fit another law."
     )

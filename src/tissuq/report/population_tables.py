@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["copy_of_covariates", "effects_of_covariates", "needed_of", "needed_table_of", "patient_in_words"]
 
-HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % HPD", "positive"]
+HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % interval", "positive"]
 HEADERS_OF_NUMBERS = ["parameter", "quantity", "now", "with any number", "specimens in all", "more"]
 QUANTITIES = {"median": "median of the population", "new patient": "a new specimen"}
 COPY = "covariates-of-specimens"

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["specimen_answer", "specimen_result"]
 
-MARGINALS = "Marginal posteriors of {name}: density (each to its own scale), 95 % HPD (bar) and median (dot)."
+MARGINALS = "Marginal posteriors of {name}: density (each to its own scale), 95 % interval (bar) and median (dot)."
 CHECKS = (
     "A good predictive check (many measurements inside the band) says nothing about the parameter: a flexible "
     "discrepancy passes it even if it has absorbed part of the stiffness. Where the band of the material alone misses "

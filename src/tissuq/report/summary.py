@@ -14,8 +14,9 @@ from tissuq.report.tables import Row, in_unit_of, interval, known_number, percen
 __all__ = ["parameter_table", "summary_row", "summary_table", "summary_tables"]
 
 HOW_TO_READ = (
-    "HPD: 95 %. In band, alone: share of measurements inside the 95 % band with the discrepancy, and inside that of "
-    "the material alone.{stability} A good predictive check does not mean that {name} is right."
+    "Intervals are the shortest that hold 95 %. In band, alone: share of measurements inside the 95 % band with the "
+    "discrepancy, and inside that of the material alone.{stability} A good predictive check does not mean "
+    "that {name} is right."
 )
 STABLE = " Stable: probability of stability over the measured stretches; all loading modes: `stability.csv`."
 LOST = " Lost at stretch: median [95 %] of the draws that become unstable."
@@ -62,7 +63,7 @@ def headline_of(row: Row) -> str:
 
 
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
-    """Return mean, sd, median and 95 % HPD of every parameter of every formulation, with its unit and prior."""
+    """Return mean, sd, median and 95 % interval of every parameter of every formulation, with its unit and prior."""
     rows = []
     for formulation, posterior in posteriors.items():
         unit = posterior.unit()
@@ -111,7 +112,7 @@ def summary_table(rows: list[Row], unit: StressUnit, title: str, main: str = "")
     has_truth, is_sampled, has_stability = (
         any(row.get(column) is not None for row in rows) for column in ("contains_truth", "rhat", "stable")
     )
-    headers = ["discrepancy", f"{name}, {unit.name}", "sd", "95 % HPD", *["truth"] * has_truth]
+    headers = ["discrepancy", f"{name}, {unit.name}", "sd", "95 % interval", *["truth"] * has_truth]
     is_lost = has_stability and any(row[STABILITY[1]] is not None for row in rows)
     headers += ["log ev.", "in band", "alone", *["stable"] * has_stability, *["lost at stretch"] * is_lost]
     headers += ["R-hat", "ESS"] * is_sampled
@@ -143,5 +144,5 @@ def parameter_table(posteriors: Mapping[str, Posterior]) -> Table:
         moments = ["–", "–"] if sd is None else [interval(mean, mean, sd)[0], interval(sd, sd, sd)[0]]
         names = [row[name] for name in ("formulation", "parameter", "unit", "prior")]
         rows.append([*names, interval(median, median, spread)[0], *moments, f"[{ends[0]}, {ends[1]}]"])
-    headers = ["discrepancy", "parameter", "unit", "prior", "median", "mean", "sd", "95 % HPD"]
+    headers = ["discrepancy", "parameter", "unit", "prior", "median", "mean", "sd", "95 % interval"]
     return Table(headers, rows, text_columns=(1, 2, 3))

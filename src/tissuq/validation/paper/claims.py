@@ -116,7 +116,7 @@ def _interval(name: str) -> Callable[[Findings], str]:
         finding = findings[name]
         holds = "holds" if finding.holds_truth else "misses"
         return (
-            f"{_count(finding.inside, finding)} inside the band; the 95 % HPD of C10, "
+            f"{_count(finding.inside, finding)} inside the band; the 95 % interval of C10, "
             f"[{finding.low:.3f}, {finding.high:.3f}] MPa, {holds} the true value"
         )
 
@@ -171,7 +171,7 @@ CLAIMS = (
     _passes_and_misses("quadratic"),
     _passes_and_misses("gp"),
     Claim(
-        "With the Yeoh mean the 95 % HPD of C10 contains the true value.",
+        "With the Yeoh mean the 95 % interval of C10 contains the true value.",
         lambda findings: findings["yeoh"].holds_truth,
         _interval("yeoh"),
     ),
