@@ -182,7 +182,7 @@ def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others
     page = (here / "few" / "report.html").read_text(encoding="utf-8")
     assert "4 draws were computed in full" in page
     assert "4 of 9 draws computed in full, the others to first order" in page
-    assert "For cells without size (Richardson" in page
+    assert "Corrected for the size of the cells, from a mesh of twice the fineness" in page
     force, mean, sd = (f"{100 * error[name]:.2g} %" for name in ("force", "mean", "sd"))
     assert f"the error of such a force is {force} at the last step" in page
     assert f"that of the mean of all draws {mean}, and that of their sd {sd}." in page

@@ -50,6 +50,18 @@ def test_the_first_view_has_every_measurement_and_the_posteriors_bands(posterior
     assert "alone" not in view  # without a discrepancy the material alone is all
 
 
+def test_both_ends_of_a_predicted_mode_are_seen_where_one_is_far_larger():
+    stretch = np.linspace(1, 6, 21)
+    posterior = tq.fit(tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.05, seed=1), discrepancy="none")
+    shown = chart_data({"none": posterior}, "none", KPA)
+    (number,) = (k for k, test in enumerate(shown["tests"]) if test["name"] == "equibiaxial (predicted)")
+    (view,) = (view for view in shown["views"] if view["test"] == number)
+    (low, high), x = view["limits"], np.array(shown["tests"][number]["x"])
+    assert min(view["median"]) < 5 * low  # compression goes on below
+    assert max(view["median"]) > (high - low) / 10
+    np.testing.assert_allclose(x[1:] / x[:-1], x[1] / x[0], rtol=1e-3)
+
+
 def test_the_axis_holds_the_measurements_and_leaves_what_is_far_out():
     vague = tq.simulate("neo-hookean", {"C10": 0.5}, [0.98, 1.0, 1.02, 1.04], noise_sd=0.02, seed=1)
     posterior = tq.fit(vague, discrepancy="none")  # so few that the noise is anything

@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 
 GRID_POINTS = 41
 """Stretches at which the bands of a mode that was not measured are drawn."""
+MAX_RATIO = 4.0
+"""Of the stresses at both ends of a mode that was not measured, as far as its axis holds them: others run out."""
 MAX_MEASUREMENTS = 1000
 """Measurements of a curve that are drawn, spread over it."""
 DIGITS = 5
@@ -142,7 +144,8 @@ def _others(posterior: Posterior) -> Iterator[_Test]:
     measured, none = {mode.name for mode in posterior.model.experiment.modes}, np.zeros(0)
     for name, stable_range in posterior.stable_ranges.items():
         if name not in measured:
-            points = np.linspace(stable_range.low, stable_range.high, GRID_POINTS)
+            spaced = np.geomspace if stable_range.low > 0 else np.linspace  # curves bend where stretches are small
+            points = spaced(stable_range.low, stable_range.high, GRID_POINTS)
             yield _Test(f"{name} (predicted)", loading_mode(name), 0, points, none, none)
 
 
@@ -183,12 +186,19 @@ def _columns(bands: _Bands, test: _Test, unit: StressUnit) -> dict[str, Any]:
         "stress_low": bands.stress.low,
         "stress_high": bands.stress.high,
     }
-    core = [test.measured, bands.measurements.median]
+    core = [test.measured, bands.measurements.median if len(test.measured) else _of_both_ends(bands.measurements)]
     if bands.alone is not None and is_determined(bands.alone, bands.stress):
         columns |= {"alone_low": bands.alone.low, "alone": bands.alone.median, "alone_high": bands.alone.high}
     limits = np.array(limits_of(core, list(columns.values())))
     columns["limits"] = limits
     return {name: _rounded(values / unit.to_mpa) for name, values in columns.items()}
+
+
+def _of_both_ends(band: Band) -> FloatArray:
+    """Return a median without what is far larger at one end than at the other, beside which that would be flat."""
+    low, high = float(np.nanmin(band.median)), float(np.nanmax(band.median))
+    smaller = min(-low, high)
+    return np.clip(band.median, -MAX_RATIO * smaller, MAX_RATIO * smaller) if smaller > 0 else band.median
 
 
 def _test(test: _Test, basis: FloatArray, unit: StressUnit) -> dict[str, Any]:

@@ -72,7 +72,7 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     caption = (
         f"{case.response.capitalize()} over {case.travel_name}: mean and {percent} band over draws of the posterior, "
-        f"without the noise of a measurement{against}.{_of_cells(simulation, table)}"
+        f"without the noise of a measurement{against}.{_corrected(table)}"
     )
     titled = f"Case '{case.name}' with {study.settings.draws} draws"
     files = {
@@ -91,7 +91,7 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
         uses=(said.use,) if said.use else (),
         next_step=_next_step(simulation, said, shlex.quote(os.path.normpath(run))),
         picture=Picture("answer", lambda: force_figure(simulation, table), f"Band of the {case.response}", caption),
-        tables=(Table(headers, rows, titled, note=_of_cells(simulation, table).strip()),),
+        tables=(Table(headers, rows, titled, note=_of_cells(simulation, table)),),
         sections=_sections(study, table),
         warnings=(*said.warnings, *study.warnings),
         files=files | ({"failures.csv": failures} if failures else {}),
@@ -110,14 +110,19 @@ def _completed(simulation: Simulation) -> str:
     return f"{in_full.sum()} of {len(forces)} draws computed in full{failed}, the others to first order"
 
 
+def _corrected(table: pd.DataFrame) -> str:
+    """Return that the size of the cells was corrected, as a sentence after others; nothing where it was not."""
+    return " Corrected for the size of the cells: see the table." if is_mesh_free(table) else ""
+
+
 def _of_cells(simulation: Simulation, table: pd.DataFrame) -> str:
-    """Return what was done for the size of the cells, as a sentence after others; nothing where nothing was."""
+    """Return how the size of the cells was corrected, in sentences; nothing where it was not."""
     if not is_mesh_free(table):
         return ""
     return (
-        f" For cells without size (Richardson, from {simulation.finer_mesh}, the error falling with the power "
-        f"{simulation.mesh_order:g} of their size): at the end {mesh_change(last_row(table))} beside "
-        "this mesh, of which a quarter is taken as the sd of its error, within the band."
+        f"Corrected for the size of the cells, from {simulation.finer_mesh}: at the end by "
+        f"{mesh_change(last_row(table))}, of which a quarter is the sd of the mesh's error in the band (Richardson's "
+        f"extrapolation, the error falling with the power {simulation.mesh_order:g} of the size)."
     )
 
 
@@ -266,7 +271,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         "forces", lambda: force_and_strain_figure(simulation, table),
         f"Band of the {case.response}, and what is strained beyond the measurements",
         f"Left: {case.response} over {case.travel_name}: mean and {percent} band over draws of the posterior, "
-        f"without the noise of a measurement{against}.{_of_cells(simulation, table)} Right: how much of the body "
+        f"without the noise of a measurement{against}.{_corrected(table)} Right: how much of the body "
         "is strained beyond the measured I1 or I2, and how much of the strain energy is there.",
     )  # fmt: skip
     sections = [Section("What is strained beyond the measurements", (forces,))]

@@ -223,7 +223,7 @@
     spot = zoomed = null;
     draw();
   };
-  // The axis holds measurements and medians, and of bands and other parameters what is near.
+  // The axis holds measurements and their medians, and of bands, other parameters and predicted modes what is near.
   const limits = () => {
     let [low, high] = view.limits;
     const reach = high - low, other = isOn("yours") ? yours().filter(Number.isFinite) : [];
