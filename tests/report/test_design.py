@@ -41,11 +41,11 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     assert rows[-1][1:3] == ["", ""]
 
 
-def test_tests_that_are_not_told_apart_from_the_best_are_named_with_it(study):
+def test_tests_that_are_as_good_as_the_best_are_named_with_it(study):
     new = ~study.table["is_repeat"] & (study.table["target"] == "modulus")
     names = study.table["candidate"][new].tolist()
-    for count, words in ((0, ""), (2, f" (not told apart from the best: {names[1]})"),
-                         (5, f" (not told apart from the best: {names[1]}, {names[2]} and 2 more)")):  # fmt: skip
+    for count, words in ((0, ""), (2, f" (as good as the best: {names[1]})"),
+                         (5, f" (as good as the best: {names[1]}, {names[2]} and 2 more)")):  # fmt: skip
         is_tied = new & (new.cumsum() <= count)
         number = _best(replace(study, table=study.table.assign(is_tied=is_tied)), study.targets[0])
         assert f" kPa{words}; repeating the data" in number.remark

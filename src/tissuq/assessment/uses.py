@@ -20,7 +20,7 @@ from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["MIN_OFTEN_STABLE", "MIN_STABLE", "PRECISE", "SPREAD", "Use", "Verdict", "uses_of"]
+__all__ = ["MIN_OFTEN_STABLE", "MIN_STABLE", "PRECISE", "SPREAD", "UNKNOWN", "Use", "Verdict", "uses_of"]
 
 PRECISE, USEFUL = 0.2, 0.5
 """Half widths of 95 % intervals, over the mean, up to which a number is precise, and of use."""

@@ -28,9 +28,9 @@ __all__ = ["rank_tests"]
 
 MAX_MEASURED_REACH = 1 + 1e-6
 """Largest reach of a stretch whose invariants were measured."""
-TOLD_APART, SHOWN = 2.0, 5e-4
-"""Standard errors of the difference of two reductions from which it is one, and what no table shows of them."""
-TIED = "not told apart from the best"
+TOLD_APART, NEGLIGIBLE = 2.0, 0.01
+"""Standard errors of the difference of two reductions from which it is one, and what of it matters to no laboratory."""
+TIED = "as good as the best"
 FEW_COMPONENTS = "inaccurate: few components of the posterior would remain"
 
 
@@ -74,7 +74,7 @@ def rank_tests(
         - beyond: share of the measurements at which I1 or I2 is larger than in the data.
         - stable: probability that the material is stable over the range; nan where that is unknown.
         - is_tied: whether its reduction is that of the best new test within two standard errors of the simulation, or
-          within what tables show (0.05 %).
+          within 1 % of the standard deviation now.
         - is_repeat: whether it repeats a test of the data; is_rough: whether few components of the posterior would
           remain, so that the numbers are unreliable; note: all this in words, or why there are no numbers.
 
@@ -112,11 +112,11 @@ def rank_tests(
 
 
 def _with_ties(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a ranking, best first, in which new tests that are not told apart from the best of a target say so."""
+    """Return a ranking, best first, in which new tests that are as good as the best of a target say so."""
     table.insert(list(table.columns).index("is_repeat"), "is_tied", False)
     for _, new_tests in table[~table["is_repeat"]].groupby("target"):
         best = new_tests.iloc[0]
-        margin = np.maximum(TOLD_APART * np.hypot(new_tests["error"], best["error"]), SHOWN)
+        margin = np.maximum(TOLD_APART * np.hypot(new_tests["error"], best["error"]), NEGLIGIBLE)
         tied = new_tests.index[(best["reduction"] - new_tests["reduction"] <= margin) & (new_tests.index != best.name)]
         if len(tied):
             table.loc[[best.name, *tied], "is_tied"] = True

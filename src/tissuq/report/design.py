@@ -32,7 +32,7 @@ MAX_ROWS = 16
 MAX_TARGETS = 2
 """Targets in the answer; the finding and the tables have all."""
 FEW_TIES = 2
-"""Tests that are named as not told apart from the best; of others their number."""
+"""Tests that are named as being as good as the best; of others their number."""
 FEW_ROWS, WIDTH = 6, 9.5
 """Number of tests in the figure beside the answer, and width of that of all, inches."""
 CAPTION = (
@@ -213,7 +213,7 @@ def _sentences(study: DesignStudy) -> list[str]:
 
 
 def _tied(best: pd.DataFrame) -> str:
-    """Return which new tests are not told apart from the best, the first, as a clause; nothing where there are none."""
+    """Return which new tests are as good as the best, the first, as a clause; nothing where there are none."""
     names = [str(name) for name in best["candidate"][best["is_tied"]][1:]]
     if not names:
         return ""

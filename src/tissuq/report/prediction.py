@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.uses import Use
+from tissuq.assessment.uses import UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
@@ -282,7 +282,7 @@ def _lead_of_bands(prediction: Prediction) -> str:
     farthest = int(change.argmax())
     if change[index] < change[farthest]:
         stresses = _stresses_at(prediction, farthest, prediction.kinds[0])
-        return f"Extrapolated to {_point(prediction, farthest)}, {stresses}: {kind}."
+        return f"Extrapolated to {_point(prediction, farthest)}, {kind}, {stresses}."
     if not prediction.kinds[0]:
         return f"Predicted by {kind}."
     material_words = kind_words(prediction, kind=False)
@@ -290,12 +290,16 @@ def _lead_of_bands(prediction: Prediction) -> str:
 
 
 def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
-    """Return every stress at a point in words, with its band: ``the stress is 5 kPa (95 %: 4 to 6)``."""
+    """Return every stress at a point in words: ``the stress is 5 kPa (95 %: 4 to 6)``, or that it is not known."""
     texts = []
     for channel, name in enumerate(prediction.stresses):
         band, scale = prediction.curves[channel, kind, False], prediction.unit.to_mpa
         median, ends = (words(band, index, scale) for words in (median_words, end_words))
-        texts.append(f"the {name} is {median} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
+        half_width = (band.high[index] - band.low[index]) / 2
+        is_known = half_width <= UNKNOWN * abs(band.median[index]) or not half_width
+        unit, percent = prediction.unit.name, f"{100 * prediction.prob:.4g} %"
+        known, unknown = f"{median} {unit} ({percent}: {ends})", f"not known at all ({percent}: {ends} {unit})"
+        texts.append(f"the {name} is {known if is_known else unknown}")
     return " and ".join(texts)
 
 

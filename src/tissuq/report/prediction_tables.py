@@ -79,9 +79,9 @@ def readable_scores(prediction: Prediction) -> list[list[str]]:
 
 
 def kind_words(prediction: Prediction, kind: bool) -> str:
-    """Return what is predicted: ``with gp``, or ``neo-hookean alone``."""
+    """Return what is predicted: ``with the discrepancy gp``, or ``neo-hookean alone``."""
     model = prediction.posterior.model
-    return f"with {model.discrepancy.name}" if kind else f"{model.material.name} alone"
+    return f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
 
 
 def scored_kind(prediction: Prediction, row: Mapping[Any, Any]) -> str:
@@ -96,6 +96,11 @@ def share_words(value: float) -> str:
 
 def _stress(value: float) -> str:
     return significant(value) if abs(value) < MAX_STRESS else f"{value:.0e}"
+
+
+def _rough(value: float) -> str:
+    """Return a stress beside one that is very large."""
+    return significant(value, 1) if abs(value) < MAX_STRESS else f"{value:.0e}"
 
 
 def median_words(band: Band, index: int, scale: float) -> str:
@@ -113,5 +118,5 @@ def end_words(band: Band, index: int, scale: float) -> str:
     low, high = (float(stress[index]) / scale for stress in (band.low, band.high))
     if max(-low, high) < MIN_STRESS:
         return "0"
-    texts = interval(low, high, (high - low) / 4) if max(-low, high) < MAX_STRESS else (f"{low:.0e}", f"{high:.0e}")
+    texts = interval(low, high, (high - low) / 4) if max(-low, high) < MAX_STRESS else (_rough(low), _rough(high))
     return "{} to {}".format(*texts)

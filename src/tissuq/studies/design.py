@@ -67,8 +67,8 @@ class DesignStudy:
         )
         return [
             "Expected sd: square root of the expected posterior variance, averaged over the possible outcomes of the "
-            "test. The error given is that of the simulation: a test is not told apart from the best where their "
-            "difference is less than two standard errors of it.",
+            "test. The error given is that of the simulation: a test is as good as the best where their difference is "
+            "less than two standard errors of it, or than 1 % of the sd now.",
             f"The next test is on {whose}. Its noise is that of the data.",
             "The expectations are only as good as the fitted model: material, discrepancy and noise.",
         ]
