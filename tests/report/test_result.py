@@ -6,6 +6,7 @@ import csv
 import json
 import re
 from math import inf, nan
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -167,6 +168,11 @@ def test_a_record_whose_parts_are_something_else_is_damaged(tmp_path, part):
     (tmp_path / "result.json").write_text(json.dumps(record))
     with pytest.raises(InputError, match="damaged"):
         read_record(tmp_path)
+
+
+def test_the_next_step_on_a_page_names_the_folder_as_the_terminal_does(tmp_path):
+    write_result(result_of(), tmp_path, target=Path("runs", "my run"))
+    assert "type tissuq design &#39;runs/my run&#39;" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_programs_get_every_json_file_with_the_folder_in_the_next_step(tmp_path):

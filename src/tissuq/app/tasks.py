@@ -92,7 +92,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
     study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=readings, early=say_answer)
     say("step", "writing the report")
     with run_folder(RUNS / name, "fit", force=True) as folder:
-        write_result(specimen_result(study, _sources(settings)), folder)
+        write_result(specimen_result(study, _sources(settings)), folder, target=RUNS / name)
     say("done", {"run": name, "report": f"runs/{name}/report.html"})
 
 
@@ -113,7 +113,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     folder_name = f"{name}-laws"
     say("step", "writing the report")
     with run_folder(RUNS / folder_name, "fit", force=True) as folder:
-        write_result(law_result(study, _sources(settings)), folder)
+        write_result(law_result(study, _sources(settings)), folder, target=RUNS / folder_name)
     shell = _shell("fit", *_files(request), options | {"out": f"runs/{folder_name}"})
     say(
         "done",

@@ -152,7 +152,7 @@ class Call(Generic[Kind, How]):
         records: list[Record] = []
 
         def write(study: Study, *, folder: Path, figures: bool) -> None:
-            records.append(write_result(result_of(study), folder, figures=figures))
+            records.append(write_result(result_of(study), folder, figures=figures, target=target))
 
         study = self.written(target, run, write, steps)
         self._show(records[0], target)

@@ -57,7 +57,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
         with run_folder(out, call.command, force=force) as folder:
-            write_result(result, folder)
+            write_result(result, folder, target=out)
     record = result.record()
     print_result(record, out, details=out is None)
     call.answer(record["numbers"])

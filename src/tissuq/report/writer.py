@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["contents_for_programs", "data_file", "posterior_files", "read_record", "write_result"]
 
 
-def write_result(result: Result, folder: Path, *, figures: bool = True) -> Record:
+def write_result(result: Result, folder: Path, *, figures: bool = True, target: Path | None = None) -> Record:
     """Write a result into a folder, whose earlier figures go; return its record.
 
     Parameters
@@ -33,6 +33,8 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> Recor
         Empty, or that of a campaign with its recipe.
     figures : bool
         Draw them, too.
+    target : Path, optional
+        Where the folder will lie, as its page calls it, if not where it is.
     """
     verb, _, options = result.command.partition(" ")
     command = " ".join(filter(None, [verb, "" if figures else "--no-figures", options]))
@@ -49,6 +51,7 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> Recor
     shown, folded = few_and_others(record)
     of_chart = result.picture.chart if figures and result.picture is not None else None
     write_page(folder, result=result, record=record, shown=shown, others=folded, command=command,
+               run=shlex.quote(str(target or folder)),
                chart_data=of_chart() if of_chart else None)  # fmt: skip
     return record
 
