@@ -135,6 +135,14 @@ def test_a_folder_holds_tables_arrays_figure_and_page(found, planar, tmp_path):
     assert "data:image/svg+xml" in page
 
 
+def test_the_legend_of_a_prediction_is_not_wider_than_its_figure(found):
+    figure = prediction_figure(found)
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    assert "measured beyond" in {text.get_text() for text in legend.get_texts()}
+    assert 0 <= legend.get_window_extent().x0 <= legend.get_window_extent().x1 <= figure.bbox.width
+
+
 def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(posterior, tmp_path):
     found = predicted(posterior, mode="planar", stretch=[1.0, 1.2, 9.0])
     write_result(prediction_result(found, PredictionSettings(run="run"), tmp_path), tmp_path, figures=False)

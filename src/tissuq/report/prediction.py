@@ -53,7 +53,7 @@ def prediction_figure(prediction: Prediction) -> Figure:
     The stretches at which an invariant is larger than in the measurements of the run are hatched.
     """
     kinds = len(prediction.kinds)
-    return _figure(prediction, 4.9 * kinds + (1.6 if kinds == 1 else 0.4), 3 * kinds if kinds > 1 else 2)
+    return _figure(prediction, 4.9 * kinds + (1.6 if kinds == 1 else 0.4), 4 if kinds > 1 else 2)
 
 
 def _figure(prediction: Prediction, width: float, across: int) -> Figure:
