@@ -133,4 +133,4 @@ def test_discrepancies_beyond_the_interval_of_the_answer_are_named_with_what_the
         study = SimpleNamespace(posteriors=fits, main="auto", headline="C10", unit=specimen_study.unit,
                                 is_cut_by_prior=lambda name: False)  # fmt: skip
         (number,) = specimen._over_discrepancies(study)
-        assert number.remark == f"beyond the interval above: above, below{reason}"
+        assert number.remark == f"the answer is that of auto; beyond its interval: above, below{reason}"

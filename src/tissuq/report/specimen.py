@@ -210,7 +210,7 @@ def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:
     outside = [name for name, mean in means.items() if not low <= mean <= high]
     shares = [abs(shares_of_discrepancy(study.posteriors[name].solution)[1][0]) for name in outside]
     reason = " (they change the initial stiffness)" if min(shares, default=0.0) > NOTABLE_SHARE else ""
-    remark = f"beyond the interval above: {', '.join(outside)}{reason}" if outside else ""
+    remark = f"the answer is that of {study.main}; beyond its interval: {', '.join(outside)}{reason}" if outside else ""
     return (Number(f"{study.headline} with {len(means)} discrepancies", ends, remark=remark),)
 
 
