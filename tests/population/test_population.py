@@ -438,7 +438,10 @@ def test_specimens_that_were_hardly_deformed_are_refused_by_name():
 def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     moduli = {"a": 1.0, "b": 1.2, "c": 0.9, "soft": 0.005}
     fits = {name: SimpleNamespace(initial_shear_modulus=SimpleNamespace(mean=value)) for name, value in moduli.items()}
-    population = SimpleNamespace(posteriors=fits, converged=True)
+    population = SimpleNamespace(
+        posteriors=fits, converged=True, symbols=("C10",), coordinates=SimpleNamespace(is_log=[True]),
+        summary=lambda: {"median": {("C10", "spread"): 0.3}},
+    )  # fmt: skip
     assert list(far_specimens(population)) == ["soft"]
     (warning,) = _far_specimens(population)
     assert warning.severity == Severity.PROBLEM
@@ -448,6 +451,8 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert _next_step(population, [without_unit]).startswith("say what the files do not")
     population.posteriors.pop("soft")
     assert "finite elements" in _next_step(population, [])
+    population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
+    assert _next_step(population, []).startswith("find out why the specimens differ so much")
 
 
 def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_that_is_known(monkeypatch):

@@ -135,7 +135,6 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
 
 def _next_step(population: Population, warnings: Sequence[str], already_without: Sequence[str] = ()) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
-    symbol = population.symbols[0]
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
     if _has(warnings, "doubtful-reading"):
@@ -146,7 +145,8 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
             f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
-    if population.coordinates.is_log[0] and population.summary()["median"][symbol, "spread"] > WIDE_SPREAD:
+    spread = float(population.summary()["median"][population.symbols[0], "spread"])
+    if population.coordinates.is_log[0] and spread > WIDE_SPREAD:
         return (
             "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
             "compute with a new one"
