@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tissuq.result_warning import WARNING_CODES, ResultWarning, Severity, in_shell, merged, most_severe_first
+from tissuq.result_warning import WARNING_CODES, ResultWarning, Severity, has_code, in_shell, merged, most_severe_first
 
 PAGE = Path(__file__).parents[1] / "docs" / "warnings.md"
 
@@ -22,6 +22,13 @@ def test_an_option_is_named_as_python_and_as_the_shell_type_it():
 
 def test_braces_without_options_stay_as_they_are():
     assert ResultWarning("column '{x}'").shell == "column '{x}'"
+
+
+def test_a_code_is_found_among_warnings_and_never_in_a_plain_sentence():
+    warnings = ["slack", ResultWarning("rows are slack.", "slack")]
+    assert has_code(warnings, "slack")
+    assert not has_code(warnings, "unstable")
+    assert not has_code(warnings[:1], "slack")
 
 
 def test_names_stand_before_both_forms():

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from types import MappingProxyType
 
-__all__ = ["WARNING_CODES", "ResultWarning", "Severity", "in_shell", "merged", "most_severe_first"]
+__all__ = ["WARNING_CODES", "ResultWarning", "Severity", "has_code", "in_shell", "merged", "most_severe_first"]
 
 
 class Severity(StrEnum):
@@ -118,6 +118,11 @@ class ResultWarning(str):
         warning = ResultWarning(python, self.code, severity)
         warning.shell = shell
         return warning
+
+
+def has_code(warnings: Iterable[str], code: str) -> bool:
+    """Whether some warning is of a code; plain sentences have none."""
+    return any(isinstance(warning, ResultWarning) and warning.code == code for warning in warnings)
 
 
 def in_shell(warning: str) -> str:

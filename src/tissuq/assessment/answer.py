@@ -18,7 +18,7 @@ from tissuq.assessment.uses import PRECISE, Use, uses_of
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
-from tissuq.result_warning import ResultWarning
+from tissuq.result_warning import ResultWarning, has_code
 
 __all__ = ["NOTABLE_SHARE", "Answer", "Estimate", "answer_of"]
 
@@ -103,7 +103,7 @@ def answer_of(
     """
     model, stiffness = solution.model, modulus(solution)
     uses = uses_of(solution, stiffness, ranges, warnings, inside)
-    has_stress_at_rest = any(warning.code == "stress-at-rest" for warning in warnings)  # which is no law's
+    has_stress_at_rest = has_code(warnings, "stress-at-rest")  # which is no law's
     headline = model.headline
     return Answer(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict
 from tissuq.inference.solution import Solution
-from tissuq.result_warning import ResultWarning, Severity
+from tissuq.result_warning import ResultWarning, Severity, has_code
 
 __all__ = ["STEPS", "Step", "next_step"]
 
@@ -102,7 +102,7 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
     reporting, _, predicting, simulating = (use.verdict for use in uses)
     model, verdicts = solution.model, list(Verdict)
     is_plain_law = solution.is_of_data and not model.energy_symbols and model.material.is_isotropic
-    if is_plain_law and all(warning.code != "stress-at-rest" for warning in warnings):
+    if is_plain_law and not has_code(warnings, "stress-at-rest"):
         return STEPS["auto"]
     for warning in warnings:
         is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))

@@ -27,7 +27,7 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT, law_files
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
-from tissuq.result_warning import ResultWarning
+from tissuq.result_warning import has_code
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
-    if _has(warnings, "doubtful-reading"):
+    if has_code(warnings, "doubtful-reading"):
         return "say what the files do not, as the warning about what was read asks, and fit again"
     if far := list(far_specimens(population)):
         options = " ".join(f"--without {name}" for name in (*already_without, *far))
@@ -152,11 +152,6 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
             "compute with a new one"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
-
-
-def _has(warnings: Sequence[str], code: str) -> bool:
-    """Return whether some warning has a code."""
-    return any(isinstance(warning, ResultWarning) and warning.code == code for warning in warnings)
 
 
 def _note(population: Population) -> str:
@@ -389,7 +384,7 @@ def _about_law(population: Population, warnings: Sequence[str]) -> str:
     solutions = [fit.solution for fit in population.posteriors.values() if has_energy(fit.solution.model)]
     shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
     known = [share for share, _, high in shares if high < 1]
-    is_clear = 2 * len(known) > len(population.posteriors) and not _has(warnings, "stress-at-rest")
+    is_clear = 2 * len(known) > len(population.posteriors) and not has_code(warnings, "stress-at-rest")
     if not is_clear or (share := float(np.median(known))) <= PRECISE:
         return ""
     law = population.complete.model.material.name

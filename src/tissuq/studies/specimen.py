@@ -30,7 +30,7 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
-from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
+from tissuq.result_warning import ResultWarning, Severity, has_code, merged, most_severe_first
 from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.specimen_settings import ALL, SpecimenSettings
 
@@ -100,7 +100,7 @@ class SpecimenStudy:
 
     def is_cut_by_prior(self, name: str) -> bool:
         """Whether a bound of a prior, not the data, determines part of a fit."""
-        return any(warning.code == "prior-bound" for warning in self.posteriors[name].warnings)
+        return has_code(self.posteriors[name].warnings, "prior-bound")
 
     @property
     def not_converged(self) -> list[str]:
