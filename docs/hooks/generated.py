@@ -128,7 +128,7 @@ def command_page(name: str, command: Any) -> str:
 def _settings(name: str) -> dict[str, str]:
     """Return the setting of every parameter of a command, where it has another name or a unit."""
     from tissuq.cli.command import settings_of
-    from tissuq.studies.slots import slots_of
+    from tissuq.studies.option import slots_of
 
     kind = settings_of(name)
     remarks = {}

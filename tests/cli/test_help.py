@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from tissuq.cli.app import app
-from tissuq.cli.former_names import FORMER_NAMES
+from tissuq.cli.command import FORMER_NAMES
 
 HEAVY = ["numpy", "jax", "pandas", "xarray", "matplotlib", "scipy", "pint", "openpyxl"]
 

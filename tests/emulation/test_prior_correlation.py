@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 import tissuq as tq
 from tissuq.emulation.prior_correlation import correlated
 from tissuq.errors import InputError
-from tissuq.studies.prior_of_run import priors_of, priors_of_run
+from tissuq.studies.earlier_run import priors_of, priors_of_run
 
 PRIORS = {"mu": tq.LogNormal(2.0, 0.3), "alpha": tq.Normal(-8.0, 1.5), "b": tq.Uniform(0.0, 1.0)}
 CORRELATION = -0.8

@@ -1,27 +1,59 @@
-"""A command of the command line, made from the settings that it declares."""
+"""A command of the command line, made from the settings that it declares; its options under former names, too."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext, redirect_stdout
 from importlib import import_module
 from inspect import Parameter, Signature
 from io import StringIO
+from types import MappingProxyType
 from typing import Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperCommand
 
 from tissuq.cli.call import Call
-from tissuq.cli.former_names import todays_names
 from tissuq.cli.progress import Monitor
 from tissuq.cli.running import Running, Verbosity
 from tissuq.cli.stopping import stopping
-from tissuq.studies.option import Settings
+from tissuq.studies.option import Settings, Slot, slots_of, stated
 from tissuq.studies.settings import load_settings
-from tissuq.studies.slots import Slot, slots_of, stated
 
-__all__ = ["CONFIGURED", "Command", "command", "settings_of"]
+__all__ = ["CONFIGURED", "FORMER_NAMES", "Command", "command", "settings_of", "todays_names"]
+
+FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "paper": {"--points": "--measurements", "--sampler": "--method"},
+        "predict": {
+            "--points": "--grid-points",
+            "--stretch": "--at",
+            "--stretch2": "--at2",
+            "--stress-type": "--stress",
+        },
+        "population": {"--specimen": "--specimen-column"},
+        "design": {"--points": "--measurements", "--specimen": "--next-specimen"},
+        "ensemble": {"--material": "--replace"},
+        "coverage": {"--noise": "--noise-is", "--noise-sd": "--noise-is"},
+        "sbc": {"--noise": "--noise-is", "--noise-sd": "--noise-is", "--formulation": "--discrepancy"},
+        "tissues": {"--formulation": "--discrepancy"},
+    }
+)
+"""By command: the name today of every option that had another one, which is still taken and which no help shows."""
+OF_RUN = "predict", "design", "export", "structure", "simulate"
+"""Commands in which ``--material law.py:Name`` was what ``--user-law`` is; a law by its name is one of the run's."""
+
+
+def todays_names(command: str, arguments: Sequence[str]) -> list[str]:
+    """Return what was typed after a command, with every option under its name today."""
+    names = FORMER_NAMES.get(command, {})
+    options = [argument.partition("=") for argument in arguments]
+    todays = []
+    for (option, equals, value), following in zip(options, [*arguments, ""][1:], strict=True):
+        is_own_law = command in OF_RUN and option == "--material" and ".py:" in (value if equals else following)
+        todays.append(("--user-law" if is_own_law else names.get(option, option)) + equals + value)
+    return todays
+
 
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound=Running)

@@ -12,7 +12,7 @@ from tissuq.cli.command import command
 from tissuq.cli.named_again import check_named_again
 from tissuq.cli.running import SCHEDULER, Configured, LawOfRun
 from tissuq.errors import InputError
-from tissuq.studies.ensemble_settings import EnsembleSettings
+from tissuq.studies.model_settings import EnsembleSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import once_each
 

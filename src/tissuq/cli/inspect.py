@@ -44,7 +44,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     """Show what is understood of files of measurements: tests, columns, dimensions, cycles, rows, noise, warnings."""
     from tissuq.experiments.reading.inspection import Inspection, overview
     from tissuq.report.run_folder import check_target, run_folder
-    from tissuq.studies.study_file import study_file
+    from tissuq.studies.files_of_tests import study_file
 
     write, ask, out, force = call.how.write, call.how.ask, call.how.out, call.how.force
     if out is not None:

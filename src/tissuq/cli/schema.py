@@ -9,8 +9,7 @@ from tissuq.cli.call import Call
 from tissuq.cli.command import CONFIGURED, command, settings_of
 from tissuq.cli.running import Running
 from tissuq.errors import InputError
-from tissuq.studies.option import Settings, argument
-from tissuq.studies.slots import slots_of
+from tissuq.studies.option import Settings, argument, slots_of
 
 __all__ = ["schema", "schema_of"]
 

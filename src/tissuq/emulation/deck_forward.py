@@ -20,10 +20,11 @@ from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material, points_of_range
 from tissuq.errors import ConvergenceError, InputError
+from tissuq.experiments.units import FORCE, LENGTH, PRESSURE
 from tissuq.export import CardFormat, Cards, CardSettings, FECode, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
 
-__all__ = ["DeckForward"]
+__all__ = ["DeckForward", "conversion", "units_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ ALLOWED_VALUE = 0.1
 """A value that every parameter of fibres in a neo-Hookean matrix may have: stress, rate, dispersion, radians."""
 PLACES = 16
 """Digits of a digest that name the folder of a run."""
+PHYSICAL = {"U": LENGTH, "RF": FORCE, "S": PRESSURE}
+"""What fields of a model are."""
 
 
 @dataclass(frozen=True)
@@ -276,3 +279,44 @@ class DeckForward(Forward):
         if not is_known or not len(curve.times) or curve.times[0] <= 0:
             return curve
         return Curve(np.concatenate([[0.0], curve.times]), np.concatenate([[0.0], curve.values]))
+
+
+def units_of(cards: CardSettings) -> dict[str, str]:
+    """Return the units of length, force and pressure of a model whose stresses are in the unit of its cards."""
+    length, force, *_ = cards.system.units.split(", ")
+    return {LENGTH.name: length, FORCE.name: force, PRESSURE.name: cards.unit}
+
+
+def conversion(text: str, cards: CardSettings, unit: str) -> float:
+    """Return what a quantity of a model is multiplied with to be in a unit; 1 of one whose unit is not known.
+
+    Parameters
+    ----------
+    text : str
+        The quantity, such as ``RF2@TOP``.
+    cards : CardSettings
+        With the unit of stress of the model, from which those of lengths and forces follow.
+    unit : str
+        That of the file; empty where it has none.
+
+    Raises
+    ------
+    InputError
+        When the unit is missing, or is one of another quantity.
+
+    Examples
+    --------
+    >>> from tissuq.export import CardSettings
+    >>> conversion("RF2@TOP", CardSettings(unit="MPa"), "mN")  # the model's are N
+    1000.0
+    """
+    quantity = parse_quantity("quantity", text)
+    kind = PHYSICAL.get(quantity.kind) if isinstance(quantity, Component) else None
+    if kind is None:
+        return 1.0
+    if not unit:
+        raise InputError(
+            f"the file does not say in which unit the {kind.name} is that {text} is compared with: write it into the "
+            f"heading of the column, as in {kind.name} [{units_of(cards)[kind.name]}]."
+        )
+    return kind.factor(units_of(cards)[kind.name]) / kind.factor(unit)

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
-from tissuq.finite_elements.energy_derivatives import gradient, gradient_and_hessian, is_arithmetic
-from tissuq.finite_elements.fibre_energy import FibreEnergy, Fibres
+from tissuq.finite_elements.energy_derivatives import FibreEnergy, Fibres, gradient, gradient_and_hessian, is_arithmetic
 from tissuq.mechanics import FibreMaterial, Material
 from tissuq.mechanics.continuation import Continuation, sum_of_energies
 from tissuq.mechanics.material import MaterialSum

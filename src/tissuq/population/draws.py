@@ -1,4 +1,4 @@
-"""The draws of a population, and what they are made from."""
+"""The draws of a population, what they are made from, and their median and shortest interval."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ from tissuq.posterior.posterior import Posterior
 if TYPE_CHECKING:
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["PopulationDraws"]
+__all__ = ["INTERVAL_COLUMNS", "PopulationDraws", "interval"]
 
 FloatArray = NDArray[np.float64]
+
+INTERVAL_COLUMNS = ["median", "hdi_low", "hdi_high"]
+"""What `interval` returns, as tables of a population have it."""
 
 
 class PopulationDraws:
@@ -106,3 +109,11 @@ class PopulationDraws:
         """Return the unit of a parameter where stresses are in a unit: that one, or none of a plain number."""
         parameters = self.complete.model.parameters
         return unit if next(p for p in parameters if p.symbol == symbol).unit else StressUnit("", 1.0)
+
+
+def interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:
+    """Return the median of draws and the ends of the shortest interval that holds a share of them."""
+    values = np.sort(draws, axis=None)
+    count = round(prob * len(values))
+    start = int((values[count:] - values[: len(values) - count]).argmin())
+    return float(np.median(values)), float(values[start]), float(values[start + count])

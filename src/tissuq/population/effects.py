@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.headed_tables import headed
 from tissuq.experiments.units import StressUnit
-from tissuq.population.draws import PopulationDraws
-from tissuq.population.intervals import INTERVAL_COLUMNS, interval
+from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, interval
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,9 +16,8 @@ from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.parameters.checks import check_probability
-from tissuq.population.draws import PopulationDraws
+from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, interval
 from tissuq.population.effects import effect_table
-from tissuq.population.intervals import INTERVAL_COLUMNS, interval
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.population.sample_size import needed_table

@@ -24,8 +24,7 @@ from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.checks import check_probability
 from tissuq.parameters.priors import Flat, Prior
-from tissuq.population.draws import PopulationDraws
-from tissuq.population.intervals import interval
+from tissuq.population.draws import PopulationDraws, interval
 from tissuq.population.likelihoods import Coordinates, on_line
 from tissuq.population.sample_size import relative_width, score
 from tissuq.posterior.posterior import Posterior

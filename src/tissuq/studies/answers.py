@@ -10,7 +10,7 @@ from typing import Any
 
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import ReadingSettings
-from tissuq.studies.slots import slots_of, stated
+from tissuq.studies.option import slots_of, stated
 
 __all__ = ["Answer", "answers_in", "options_in", "with_options"]
 

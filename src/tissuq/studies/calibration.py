@@ -142,7 +142,7 @@ def run_calibration(
 
 def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> CalibrationSettings:
     """Return settings in which the posterior of a run stands as priors; what is stated of a parameter stays."""
-    from tissuq.studies.prior_of_run import priors_of_run
+    from tissuq.studies.earlier_run import priors_of_run
 
     if settings.prior_run is None:
         return settings

@@ -289,7 +289,7 @@ class CalibrationSettings(ModelSettings):
     ) -> DeckForward:
         from tissuq.decks.quantity import located
         from tissuq.emulation import DeckForward
-        from tissuq.emulation.deck_units import conversion
+        from tissuq.emulation.deck_forward import conversion
         from tissuq.errors import InputError
         from tissuq.experiments.units import LENGTH
 

@@ -13,7 +13,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.quantities import QuantityTarget, quantity_target
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.ensemble import drawn_materials
-from tissuq.studies.ensemble_settings import EnsembleSettings
+from tissuq.studies.model_settings import EnsembleSettings
 from tissuq.studies.settings import RECIPE, damage_reported, load_settings
 
 __all__ = ["ensemble_target", "names_ensemble", "with_folder"]

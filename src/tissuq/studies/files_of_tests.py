@@ -1,7 +1,8 @@
-"""Files of measurements that are named with their options: tests in them, modes, specimens and noise."""
+"""Files of measurements named with their options: tests in them, modes, specimens, noise, and a TOML file of these."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,14 +13,33 @@ from tissuq.studies.settings import load_settings
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.reading.inspection import Inspection
     from tissuq.experiments.reading.table import Table
 
-__all__ = ["files_of", "find_tests", "measured", "resolve", "run_name", "tables_of", "tests_in_words"]
+__all__ = ["files_of", "find_tests", "measured", "resolve", "run_name", "study_file", "tables_of", "tests_in_words"]
 
 OPTIONAL_FOR_TESTS = ("dimensions", "compression_positive")
 """Options that a test does without where another one needs them: an error where none does."""
 SELECTION = ("sheet", "table", "columns", "only", *OPTIONAL_FOR_TESTS)
 """Options that differ between the tests in a file: where each is, and what not all need."""
+HEAD = """\
+# What was understood of these tests. Change what is wrong, then: tissuq fit FILE.toml
+# The options of every test are those of reading (tissuq inspect --help); lines that begin with a # are remarks.
+
+material = "neo-hookean"        # see: tissuq materials
+# discrepancies = ["auto"]      # see: tissuq discrepancies
+# estimand = "tissue"           # what intervals are of: as-tested, specimen or tissue
+# stable_in = ["all"]           # modes in which the material must be stable
+
+"""
+OPTIONS = """\
+# specimen = "S1"               # tests with the same name are of one specimen
+# cycle = "last"
+# branch = "loading"
+# preload = "0.01 N"
+# until_peak = true
+"""
+"""Options that tests often need, as remarks on the first."""
 
 
 def resolve(file: Path) -> Path:
@@ -183,3 +203,35 @@ def _for_each(counts: Sequence[int], option: str, values: Sequence[Any] | None) 
         return list(values)
     tests = f" with {sum(counts)} tests" if sum(counts) != len(counts) else ""
     raise InputError(f"{option} is given {len(values)} times for {len(counts)} files{tests}; give it once for each.")
+
+
+def study_file(tests: Sequence[Mapping[str, Any]], inspections: Sequence[Inspection], folder: Path) -> str:
+    """Return the text of a file that ``tissuq fit`` takes, with remarks on what was understood of every test.
+
+    Parameters
+    ----------
+    tests : sequence of mapping
+        The settings that read each test.
+    inspections : sequence of Inspection
+        What was understood of them.
+    folder : Path
+        Where the file will lie: files of measurements are named from there.
+    """
+    import tomli_w
+
+    blocks = [HEAD]
+    for test, inspection in zip(tests, inspections, strict=True):
+        remarks = [inspection.line, *(f"Note: {text}" for text in inspection.warnings)]
+        named = {"name": inspection.reading.experiment.name, **test}
+        named["file"] = Path(os.path.relpath(test["file"], folder)).as_posix()
+        if "mode" not in test:
+            named["mode"] = inspection.reading.experiment.mode.name
+            remarks.append("Note: the loading mode is a guess: nothing in the file says which it is.")
+        comments = "".join(f"# {line}\n" for text in remarks for line in text.splitlines())
+        values = {name: value for name, value in named.items() if not isinstance(value, dict)}
+        tables = {name: value for name, value in named.items() if isinstance(value, dict) and value}
+        settings = tomli_w.dumps(values) + "".join(
+            f"\n[tests.{name}]\n{tomli_w.dumps(value)}" for name, value in tables.items()
+        )
+        blocks.append(f"[[tests]]\n{comments}{OPTIONS if test is tests[0] else ''}{settings}\n")
+    return "".join(blocks)

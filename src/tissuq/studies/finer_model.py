@@ -12,7 +12,7 @@ from tissuq.decks import Deck, Quantity
 from tissuq.decks.model_run import check_sets
 from tissuq.errors import InputError
 from tissuq.posterior.ensemble import Ensemble
-from tissuq.studies.ensemble_settings import EnsembleSettings
+from tissuq.studies.model_settings import EnsembleSettings
 
 __all__ = ["FINER", "FinerModel", "finer_model"]
 

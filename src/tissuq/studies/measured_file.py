@@ -1,4 +1,4 @@
-"""Settings that studies of measured files share: how a file is read, which material and noise are fitted."""
+"""Settings that studies of measured files share: how a file is read, what is fitted, and errors of whole tests."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, Self, cast
 from pydantic import Field, field_validator, model_validator
 
 from tissuq.studies.option import Settings, option
-from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown
-from tissuq.studies.settings import positive_or_unknown
+from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown, tolerances
+from tissuq.studies.settings import SizesOfErrors, looked_up, positive_or_unknown
 from tissuq.studies.shared_options import seed
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tissuq.experiments.reading.options import ReadingOptions
     from tissuq.experiments.units import StressUnit
     from tissuq.model.noise import Noise
+    from tissuq.model.tolerances import Tolerances
 
 __all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
@@ -162,7 +163,7 @@ class MeasuredTest(MeasuredFile):
 
 
 class FittedSettings(Settings):
-    """What is fitted; the noise is in the files' unit of stress."""
+    """What is fitted, and by how much whole tests may be off; noise and errors are in the files' unit of stress."""
 
     material: str = option("neo-hookean", "Material, as for tissuq fit [neo-hookean]; see tissuq materials.")
     noise_sd: float | Literal["unknown"] | dict[str, float | Literal["unknown"]] = option(
@@ -179,6 +180,20 @@ class FittedSettings(Settings):
         "auto", "Of every specimen's fit: auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method"
     )
     seed: int = seed()
+    estimand: str | None = option(
+        None,
+        "What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a careful "
+        "laboratory), or the tissue (the mean of its specimens) [specimen; tissue for files of several specimens].",
+    )
+    tolerances: SizesOfErrors = option(
+        None,
+        "Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, length=2%, "
+        "slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single "
+        "stretch=0.001 or stress, resolution=0.2% (of the largest); or none; repeat.",
+        name="tolerance",
+        takes=list[str],
+        parse=tolerances,
+    )
 
     @field_validator("noise_sd", mode="before")
     @classmethod
@@ -186,6 +201,15 @@ class FittedSettings(Settings):
         return positive_or_unknown(
             value, "the file's stress unit", "; noise of zero would make every measurement exact"
         )
+
+    @field_validator("estimand")
+    @classmethod
+    def _estimand_there_is(cls, name: str | None) -> str | None:
+        from tissuq.model.tolerances import Tolerances
+
+        if name is not None:
+            looked_up(Tolerances, name)
+        return name
 
     @model_validator(mode="after")
     def _one_noise(self) -> Self:
@@ -200,3 +224,18 @@ class FittedSettings(Settings):
         if isinstance(self.noise_sd, float):
             return noise_named(self.noise_sd * unit.to_mpa)
         return noise_named(self.noise or "unknown")
+
+    def tolerances_in(self, unit: StressUnit) -> Tolerances | dict[str, float] | None:
+        """Return the tolerances, those of stresses converted from a unit to MPa.
+
+        Where no estimand is given, the sizes that replace those of `tissuq.fit`, or None.
+        """
+        from tissuq.model.tolerances import Tolerances
+
+        if self.tolerances is None and self.estimand is None:
+            return None
+        sizes = self.tolerances or {}
+        is_stress = {error.name for error, _ in Tolerances(**sizes) if error.is_stress}
+        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in sizes}
+        in_mpa = {name: size * scale[name] for name, size in sizes.items()}
+        return in_mpa if in_mpa and self.estimand is None else Tolerances(self.estimand or "", **in_mpa)

@@ -12,7 +12,6 @@ from tissuq.errors import InputError
 from tissuq.studies.measured_file import FittedSettings, ReadingSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import pairs_of, share
-from tissuq.studies.tolerance_settings import ToleranceSettings
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.covariates import CovariateTable
@@ -30,7 +29,7 @@ def known_of_patient(texts: Sequence[str]) -> dict[str, str]:
     return pairs([pair for text in texts for pair in text.split(",")])
 
 
-class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
+class PopulationSettings(FittedSettings, ReadingSettings):
     """Everything that a population depends on; the noise in the files' unit of stress.
 
     Without a mode every test says its own, as for `tissuq.read_experiment`. Of a file of several tests each is of a

@@ -14,7 +14,6 @@ from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredT
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import noises, priors
 from tissuq.studies.settings import looked_up
-from tissuq.studies.tolerance_settings import ToleranceSettings
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -29,7 +28,7 @@ ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply; in place of laws: all."""
 
 
-class SpecimenSettings(ToleranceSettings, FittedSettings, MeasuredFile):
+class SpecimenSettings(FittedSettings, MeasuredFile):
     """Everything that a fit depends on; stresses (noise, priors) in the unit of stress of the file, or the first one.
 
     It is of one ``file``, or of several ``tests`` together.

@@ -11,9 +11,8 @@ import numpy as np
 
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading, read_file
-from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.findings import concerned, data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
-from tissuq.experiments.reading.notes import concerned
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.vocabulary import SPREADS

@@ -1,32 +1,41 @@
-"""A campaign as small tasks: a set of tests, its fit and an oracle's, and the bands of the forces of structures."""
+"""A campaign as small tasks: simulated tests of a known law, their fit and an oracle's, and bands of the forces."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.errors import TissuqError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements.response import respond
 from tissuq.finite_elements.simulation import COMPLETE, simulate
 from tissuq.finite_elements.spread import band_of
-from tissuq.mechanics import material_named
+from tissuq.mechanics import engineering_stress, material_named
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.stream import Campaign
-from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES, StructureStudySettings
-from tissuq.validation.structures.simulated_tests import simulated_tests
+from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES, KnownLaw, StructureStudySettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["DEFAULT", "ORACLE", "StructureTask", "carry_out", "run_structures", "summarise_structures", "tasks_of"]
+__all__ = [
+    "DEFAULT", "ORACLE", "StructureTask", "carry_out", "run_structures", "simulated_tests", "summarise_structures",
+    "tasks_of",
+]  # fmt: skip
+
+FloatArray = NDArray[np.float64]
 
 DEFAULT, ORACLE = "default", "oracle"
 """The fit as it is unless anything is said, and one that knows the law."""
+SMOOTH_LENGTH = 1 / 3
+"""Correlation length of smooth errors, in ranges of the stretch."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,44 @@ def carry_out(settings: StructureStudySettings, task: StructureTask) -> dict[str
 
 run_structures = Campaign(tasks_of, carry_out)
 """Carries out a campaign on the force of structures."""
+
+
+def simulated_tests(settings: StructureStudySettings, truth: KnownLaw, seed: list[int]) -> list[Experiment]:
+    """Return a test in every mode of one specimen of a law.
+
+    The stress is that at the true stretch; what is recorded is a stretch with errors of length and slack, and a stress
+    with a factor of the specimen (``stress``), one of the test (``test``), a smooth relative error, a zero, the
+    resolution of the load cell and noise: normal, with the standard deviations of the settings' tolerances.
+    """
+    generator, sizes = np.random.default_rng(seed), settings.tolerances.sizes
+    law, specimen = material_named(truth.material), _factor(generator, sizes, "stress")
+    tests = []
+    for mode in settings.modes:
+        loading = loading_mode(mode)
+        low = max(settings.low, 1.0) if mode != "uniaxial" else settings.low
+        stretch = np.linspace(low, settings.high, settings.points + 1)
+        stretch = stretch[np.abs(stretch - 1) > 1e-6][: settings.points]
+        stress = engineering_stress(law, loading.paths[0], stretch, np.array([truth.values]))[0]
+        largest = float(np.abs(stress).max())
+        measured = stress * specimen * _factor(generator, sizes, "test") * _smooth(generator, sizes, stretch)
+        scatter = np.hypot(settings.noise, sizes.get("resolution", 0.0)) * largest
+        measured = measured + sizes.get("zero", 0.0) * generator.standard_normal()
+        measured = measured + scatter * generator.standard_normal(len(stretch))
+        recorded = 1 + (stretch - 1) * _factor(generator, sizes, "length")
+        recorded = recorded + sizes.get("slack", 0.0) * generator.standard_normal()
+        tests.append(Experiment(loading, recorded, measured).labelled(name=mode, specimen="simulated"))
+    return tests
+
+
+def _factor(generator: np.random.Generator, sizes: Mapping[str, float], name: str) -> float:
+    return float(1 + sizes.get(name, 0.0) * generator.standard_normal())
+
+
+def _smooth(generator: np.random.Generator, sizes: Mapping[str, float], stretch: FloatArray) -> FloatArray:
+    """Return factors (n,) that vary smoothly along a test."""
+    distance = (stretch[:, None] - stretch) / (SMOOTH_LENGTH * np.ptp(stretch))
+    root = np.linalg.cholesky(np.exp(-0.5 * distance**2) + 1e-9 * np.eye(len(stretch)))
+    return np.asarray(1 + sizes.get("smooth", 0.0) * (root @ generator.standard_normal(len(stretch))))
 
 
 @lru_cache
