@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, Struct
 from tissuq.studies.option import option
 
 if TYPE_CHECKING:
+    from tissuq.report.result import Result
     from tissuq.studies.stream import Campaign as CampaignOfTasks
 
 __all__ = ["study"]
@@ -55,8 +57,7 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     of_preset: dict[str, Any] = preset(name) if name else {}
     settings = call.loaded_as(CoverageSettings, **of_preset | call.stated)
     folder = call.how.out or Path("runs") / f"coverage-{name or (call.config or Path()).stem}"
-    results = _carry_out(call, settings, folder, run_campaign)
-    call.put_into(folder, coverage_result(settings, results))
+    _carry_out(call, settings, folder, run_campaign, coverage_result)
 
 
 @study.command("sbc", cls=Command)
@@ -73,8 +74,7 @@ def _calibrate(call: Call[SbcOptions, Any]) -> None:
 
     settings, material = call.loaded_as(SbcSettings), call.stated.get("material")
     folder = _folder(call, f"sbc-{material}" if material else "sbc")
-    results = _carry_out(call, settings, folder, run_sbc)
-    call.put_into(folder, sbc_result(settings, results))
+    _carry_out(call, settings, folder, run_sbc, sbc_result)
 
 
 @study.command("tissues", cls=Command)
@@ -85,9 +85,7 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
     from tissuq.validation.tissues import TissueSettings, run_benchmark
 
     settings = call.loaded_as(TissueSettings)
-    target = _folder(call, "tissues")
-    results = _carry_out(call, settings, target, run_benchmark)
-    call.put_into(target, tissue_result(settings, results))
+    _carry_out(call, settings, _folder(call, "tissues"), run_benchmark, tissue_result)
 
 
 @study.command("structures", cls=Command)
@@ -98,9 +96,7 @@ def structures(call: Call[StructureStudyOptions, Campaign]) -> None:
     from tissuq.validation.structures import StructureStudySettings, run_structures
 
     settings = call.loaded_as(StructureStudySettings)
-    target = _folder(call, "structures")
-    results = _carry_out(call, settings, target, run_structures)
-    call.put_into(target, structures_result(settings, results))
+    _carry_out(call, settings, _folder(call, "structures"), run_structures, structures_result)
 
 
 def _folder(call: Call[Any, Any], name: str) -> Path:
@@ -108,12 +104,19 @@ def _folder(call: Call[Any, Any], name: str) -> Path:
     return call.how.out or Path("runs") / (call.config.stem if call.config else name)
 
 
-def _carry_out(call: Call[Any, Any], settings: Any, folder: Path, run: CampaignOfTasks[Any]) -> list[dict[str, Any]]:
-    """Carry out a campaign in its folder; nothing is written before its workers are there."""
+def _carry_out(
+    call: Call[Any, Any],
+    settings: Any,
+    folder: Path,
+    run: CampaignOfTasks[Any],
+    result_of: Callable[[Any, list[dict[str, Any]]], Result],
+) -> None:
+    """Carry out a campaign in its folder, and put its result there; nothing is written before its workers are there."""
     from tissuq.studies.stream import open_pool
 
     total = len(run.tasks_of(settings))
     check_folder(folder, settings)
     with open_pool(call.how.workers, call.how.scheduler) as pool, call.campaign_in(folder)(total) as step:
         write_campaign_recipe(folder, settings)
-        return run(settings, folder, pool=pool, step=step)
+        results = run(settings, folder, pool=pool, step=step)
+    call.put_into(folder, result_of(settings, results))

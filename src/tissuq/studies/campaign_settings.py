@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator
 
 from tissuq.parameters.checks import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
@@ -13,7 +15,10 @@ from tissuq.studies.shared_options import seed
 
 __all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions"]
 
-NoiseKnown = tuple[Literal["known", "unknown"], ...]
+NoiseKnown = Annotated[
+    tuple[Literal["known", "unknown"], ...],
+    BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
+]
 NOISE = "known or unknown to the fits."
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DAMAGE", "RECIPE", "SizesOfErrors", "damage_reported", "is_inside", "load_settings", "looked_up",
-    "positive_or_unknown", "setting_of",
+    "positive_or_unknown", "setting_of", "there_is",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
@@ -162,6 +162,17 @@ def looked_up(find: Callable[[Any], Named], name: Any) -> Named:
         return find(name)
     except TissuqError as error:
         raise ValueError(str(error)) from error
+
+
+def there_is(find: Callable[[Any], object]) -> Callable[[Any], Any]:
+    """Return a validator of a name, or of several: each must be one that ``find`` knows, as of `looked_up`."""
+
+    def check(value: Any) -> Any:
+        for name in value if isinstance(value, tuple) else (value,):
+            looked_up(find, name)
+        return value
+
+    return check
 
 
 def _errors_there_are(sizes: dict[str, float] | None) -> dict[str, float] | None:

@@ -69,11 +69,6 @@ class SbcSettings(SbcOptions):
     design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
     priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
 
-    @field_validator("noise", mode="before")
-    @classmethod
-    def _one_or_more(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
-
     @field_validator("formulations", "noise")
     @classmethod
     def _each_once(cls, values: tuple[str, ...]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.studies.campaign_settings import CoverageOptions
-from tissuq.studies.settings import looked_up
+from tissuq.studies.settings import looked_up, there_is
 from tissuq.validation.coverage.fitted import model_of, parameters_of, parts_of
 from tissuq.validation.coverage.truths import FAMILIES, FIXED, MIN_LOCKING_LIMIT, TRUTHS
 
@@ -39,6 +39,16 @@ LOCKING = {"gent": MIN_LOCKING_LIMIT, "gent-gent": MIN_LOCKING_LIMIT, "fixed-gen
 """The smallest I1 - 3 at which truths have no finite stress."""
 
 
+def _curve(name: str) -> None:
+    if not loading_mode(name).is_curve:
+        raise ModelError(f"a campaign needs a loading mode with one stress and one stretch, which '{name}' is not")
+
+
+def _parts(name: str) -> None:
+    for discrepancy in parts_of(name):
+        discrepancy_named(discrepancy)
+
+
 class Design(BaseModel):
     """Where a specimen is measured, and with what noise (MPa, or times C10 in a campaign with a scale)."""
 
@@ -50,17 +60,13 @@ class Design(BaseModel):
     noise_sd: float = Field(gt=0, allow_inf_nan=False)
     mode: str = "uniaxial"
 
+    _known_mode = field_validator("mode")(there_is(_curve))
+
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.low >= self.high:
             raise ValueError(f"low ({self.low}) must be less than high ({self.high})")
         return self
-
-    @field_validator("mode")
-    @classmethod
-    def _known_mode(cls, name: str) -> str:
-        looked_up(_curve, name)
-        return name
 
     @property
     def label(self) -> str:
@@ -94,11 +100,6 @@ class CoverageSettings(CoverageOptions):
     prob: float = Field(0.95, gt=0, lt=1)
     most_fits: int = Field(1_000_000, ge=1)
 
-    @field_validator("noise", mode="before")
-    @classmethod
-    def _one_or_more(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
-
     @field_validator("families", "designs", "formulations", "strengths", "noise", "unseen")
     @classmethod
     def _each_once(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -115,20 +116,8 @@ class CoverageSettings(CoverageOptions):
                 raise ValueError(f"there is no family '{name}'; there are {', '.join(TRUTHS)}")
         return names
 
-    @field_validator("formulations")
-    @classmethod
-    def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            for discrepancy in parts_of(name):
-                looked_up(discrepancy_named, discrepancy)
-        return names
-
-    @field_validator("unseen")
-    @classmethod
-    def _known_modes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            looked_up(_curve, name)
-        return names
+    _known_formulations = field_validator("formulations")(there_is(_parts))
+    _known_modes = field_validator("unseen")(there_is(_curve))
 
     @field_validator("scale")
     @classmethod
@@ -210,8 +199,3 @@ def preset(name: str) -> dict[str, object]:
     if name not in PRESETS:
         raise InputError(f"there is no preset '{name}'. Choose one of: {', '.join(PRESETS)}.")
     return tomllib.loads((files("tissuq.validation.coverage") / "presets" / f"{name}.toml").read_text(encoding="utf-8"))
-
-
-def _curve(name: str) -> None:
-    if not loading_mode(name).is_curve:
-        raise ModelError(f"a campaign needs a loading mode with one stress and one stretch, which '{name}' is not")

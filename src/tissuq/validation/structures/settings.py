@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 from pydantic import field_validator
 
+from tissuq.errors import ModelError
 from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements import Case, ClampedBar, Indentation, PlateWithHole
 from tissuq.model.tolerances import Tolerances
 from tissuq.parameters.priors import Prior, Uniform
 from tissuq.studies.campaign_settings import StructureStudyOptions
-from tissuq.studies.settings import looked_up
+from tissuq.studies.settings import there_is
 
 __all__ = ["KNOWN_LAWS", "STRUCTURES", "KnownLaw", "StructureStudySettings"]
 
@@ -37,6 +38,11 @@ STRUCTURES: dict[str, Case] = {
     "plate": PlateWithHole(elongation=2.0, fineness=0.5),
 }
 """Structures by name, with meshes that are the same for the truth: errors of a mesh have no part in coverage."""
+
+
+def _with_one_control(name: str) -> None:
+    if len(loading_mode(name).controls) > 1:
+        raise ModelError(f"the mode {name!r} has several controls; choose among those with one")
 
 
 class StructureStudySettings(StructureStudyOptions):
@@ -73,19 +79,8 @@ class StructureStudySettings(StructureStudyOptions):
     def _known_structures(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         return _all_of(names, STRUCTURES, "structure")
 
-    @field_validator("modes")
-    @classmethod
-    def _known_modes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            if len(looked_up(loading_mode, name).controls) > 1:
-                raise ValueError(f"the mode {name!r} has several controls; choose among those with one")
-        return names
-
-    @field_validator("estimand")
-    @classmethod
-    def _known_estimand(cls, name: str) -> str:
-        looked_up(Tolerances, name)
-        return name
+    _known_modes = field_validator("modes")(there_is(_with_one_control))
+    _known_estimand = field_validator("estimand")(there_is(Tolerances))
 
     @property
     def tolerances(self) -> Tolerances:

@@ -7,7 +7,7 @@ from pydantic import Field, field_validator
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.studies.campaign_settings import TissueOptions
-from tissuq.studies.settings import looked_up
+from tissuq.studies.settings import there_is
 from tissuq.validation.tissues.protocols import PROTOCOLS
 
 __all__ = ["RIVALS", "TissueSettings"]
@@ -55,19 +55,10 @@ class TissueSettings(TissueOptions):
                 raise ValueError(f"there is no protocol '{name}'; choose from {', '.join(PROTOCOLS)}")
         return names
 
-    @field_validator("formulations")
-    @classmethod
-    def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            if name not in RIVALS:
-                looked_up(discrepancy_named, name)
-        return names
-
-    @field_validator("material")
-    @classmethod
-    def _known_material(cls, name: str) -> str:
-        looked_up(material_named, name)
-        return name
+    _known_formulations = field_validator("formulations")(
+        there_is(lambda name: RIVALS.get(name) or discrepancy_named(name))
+    )
+    _known_material = field_validator("material")(there_is(material_named))
 
     @field_validator("protocols", "formulations")
     @classmethod
