@@ -17,6 +17,7 @@ from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.emulation.warnings import calibration_warnings
 from tissuq.inference.marginal import Marginal
 from tissuq.parameters.checks import check_probability
+from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.prediction.bands import Mixtures
 
 if TYPE_CHECKING:
@@ -232,6 +233,10 @@ class Calibration:
         Groups posterior and posterior_predictive (chain, draw), observed_data, constant_data, and forward_runs
         (parameters, outputs, errors).
         """
+        return tree_of(self._groups)
+
+    @cached_property
+    def _groups(self) -> dict[str, LabelledGroup]:
         return labelled_arrays(self)
 
     def posterior_of(
@@ -277,9 +282,7 @@ class Calibration:
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
-        # The HDF5 library must not meet a full disk itself: it then fails at a place where no one can catch it.
-        content = bytes(self.data.to_netcdf(engine="h5netcdf"))
-        Path(path).write_bytes(content)
+        save_groups(self._groups, Path(path))
 
     def __repr__(self) -> str:
         return (
@@ -292,10 +295,8 @@ PREDICTIVE_STRIDE = 4
 """Stride of the draws for which measurements are simulated."""
 
 
-def labelled_arrays(calibration: Calibration) -> xr.DataTree:
+def labelled_arrays(calibration: Calibration) -> dict[str, LabelledGroup]:
     """Return draws, measurements as simulated and as made, and forward runs: the groups of `Calibration.data`."""
-    import xarray as xr
-
     problem, runs, drawn = calibration.problem, calibration.runs, calibration.posterior.draws
     chains, draws = np.arange(drawn.shape[0]), np.arange(drawn.shape[1])
     sample, thinned_sample = {"chain": chains, "draw": draws}, {"chain": chains, "draw": draws[::PREDICTIVE_STRIDE]}
@@ -305,16 +306,17 @@ def labelled_arrays(calibration: Calibration) -> xr.DataTree:
     simulated = calibration.likelihood.replicates(flat, scores).reshape(*thinned.shape[:2], -1)
     point, run = {"measurement": np.arange(len(problem.measured))}, {"run": np.arange(len(runs))}
     columns = enumerate(problem.symbols)
-    groups = {
-        "posterior": xr.Dataset(
+    return {
+        "/": LabelledGroup(attrs=_labels(calibration)),
+        "posterior": LabelledGroup(
             {symbol: (("chain", "draw"), drawn[:, :, column]) for column, symbol in columns}, sample
         ),
-        "posterior_predictive": xr.Dataset(
+        "posterior_predictive": LabelledGroup(
             {"measured": (("chain", "draw", "measurement"), simulated)}, thinned_sample | point
         ),
-        "observed_data": xr.Dataset({"measured": ("measurement", problem.measured)}, point),
-        "constant_data": xr.Dataset({"control": ("measurement", problem.control)}, point),
-        "forward_runs": xr.Dataset(
+        "observed_data": LabelledGroup({"measured": ("measurement", problem.measured)}, point),
+        "constant_data": LabelledGroup({"control": ("measurement", problem.control)}, point),
+        "forward_runs": LabelledGroup(
             {
                 "parameters": (("run", "parameter"), runs.points),
                 "outputs": (("run", "measurement"), runs.outputs),
@@ -324,9 +326,6 @@ def labelled_arrays(calibration: Calibration) -> xr.DataTree:
             point | run | {"parameter": list(runs.symbols)},
         ),
     }
-    tree = xr.DataTree.from_dict(groups)
-    tree.attrs.update(_labels(calibration))
-    return tree
 
 
 def _labels(calibration: Calibration) -> dict[str, str | float]:

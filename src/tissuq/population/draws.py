@@ -1,4 +1,4 @@
-"""The draws of a population, what they are made from, and their median and shortest interval."""
+"""The draws of a population, what they are made from, their median and interval, and all as labelled arrays."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.population.covariates import Covariates, covariates_of
 from tissuq.population.likelihoods import Coordinates
+from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.posterior.posterior import Posterior
 
 if TYPE_CHECKING:
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["INTERVAL_COLUMNS", "PopulationDraws", "interval"]
+__all__ = ["INTERVAL_COLUMNS", "PopulationDraws", "interval", "labelled_arrays"]
 
 FloatArray = NDArray[np.float64]
 
@@ -117,3 +118,75 @@ def interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:
     count = round(prob * len(values))
     start = int((values[count:] - values[: len(values) - count]).argmin())
     return float(np.median(values)), float(values[start]), float(values[start + count])
+
+
+def labelled_arrays(population: PopulationDraws, labels: Mapping[str, str | float]) -> dict[str, LabelledGroup]:
+    """Return draws and data of a population, with the names of specimens and parameters, and further attributes."""
+    coordinates, hierarchy, covariates = population.coordinates, population.hierarchy, population.covariates
+    symbols, posteriors = list(population.symbols), population.posteriors.values()
+    chains, draws = hierarchy.mean.shape[:2]
+    sample = {"chain": np.arange(chains), "draw": np.arange(draws)}
+    parameter, specimen = {"parameter": symbols}, {"specimen": list(population.names)}
+    by_parameter, by_pair = ("chain", "draw", "parameter"), ("chain", "draw", "parameter", "other_parameter")
+    of_specimen = ("chain", "draw", "specimen", "parameter")
+    no_pooling = np.stack([_drawn(posterior, symbols, (chains, draws)) for posterior in posteriors], axis=2)
+    complete_pooling = _drawn(population.complete, symbols, (chains, draws))
+    data = [posterior.model.experiment for posterior in posteriors]
+    columns = {"covariate": [name for name, _ in covariates.effects]} if covariates else {}
+    arrays: dict[str, Any] = {
+        "median": (by_parameter, population.median),
+        "spread": (by_parameter, population.spread),
+        "correlation": (by_pair, hierarchy.correlation),
+        "specimens": (of_specimen, population.specimens),
+    }
+    if covariates:
+        effects = hierarchy.effects / covariates.sizes[:, None] * coordinates.scale
+        arrays["effect"] = (("chain", "draw", "covariate", "parameter"), effects)
+    groups = {
+        "/": LabelledGroup(attrs=_labels(population) | dict(labels)),
+        "posterior": LabelledGroup(arrays, sample | parameter | specimen | {"other_parameter": symbols} | columns),
+        "new_patient": LabelledGroup({"parameters": (by_parameter, population.new)}, sample | parameter),
+        "no_pooling": LabelledGroup({"specimens": (of_specimen, no_pooling)}, sample | parameter | specimen),
+        "complete_pooling": LabelledGroup({"parameters": (by_parameter, complete_pooling)}, sample | parameter),
+        "observed_data": LabelledGroup(
+            {"stress": ("measurement", np.concatenate([test.measured for test in data]), {"units": "MPa"})}
+        ),
+        "constant_data": LabelledGroup(
+            {
+                "stretch": ("measurement", np.concatenate([test.states.abscissa for test in data])),
+                "specimen": ("measurement", np.repeat(np.arange(len(data)), [test.size for test in data])),
+                "mode": (
+                    "measurement",
+                    [curve.mode.name for test in data for curve in test.curves for _ in range(len(curve))],
+                ),
+            }
+        ),
+    }
+    if covariates:
+        design = (("specimen", "covariate"), covariates.design)
+        groups["covariates"] = LabelledGroup({"design": design}, columns | specimen)
+    return groups
+
+
+def _labels(population: PopulationDraws) -> dict[str, str | float]:
+    model, diagnostics = population.complete.model, population.hierarchy.diagnostics
+    return {
+        "inference_library": "tissuq",
+        "material": model.material.name,
+        "discrepancy": model.discrepancy.name,
+        "noise": str(model.noise),
+        "loading_mode": ", ".join(mode.name for mode in model.experiment.modes),
+        "stress_unit": model.experiment.stress_unit,
+        "logarithms": ", ".join(np.array(population.symbols)[population.coordinates.is_log]),
+        "verdict": diagnostics.verdict,
+        "effective": population.hierarchy.effective,
+        "spread_prior": f"half-normal({population.spread_prior:g})",
+        "seed": population.seed,
+    }
+
+
+def _drawn(posterior: Posterior, symbols: list[str], shape: tuple[int, int]) -> FloatArray:
+    """Return draws (chains, draws, d) of a posterior, evenly thinned from its own."""
+    draws = np.column_stack([posterior.solution.draws[symbol].ravel() for symbol in symbols])
+    rows = np.linspace(0, len(draws) - 1, shape[0] * shape[1]).round().astype(int)
+    return np.asarray(draws[rows].reshape(*shape, len(symbols)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from tissuq.inference.solution import Diagnostics, Marginals, Solution
 from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.population.draws import PopulationDraws
 from tissuq.population.likelihoods import Coordinates
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.moments import drawn_curves, values_of
@@ -49,39 +49,19 @@ def matching_draws(posterior: Posterior, coordinates: Coordinates, targets: Floa
     return points[KDTree(line_values / spread).query(targets / spread)[1]]
 
 
-def patient_posterior(
-    posteriors: Sequence[Posterior],
-    complete: Posterior,
-    coordinates: Coordinates,
-    hierarchy: Hierarchy,
-    new: FloatArray,
-    covariates: str = "",
-) -> Posterior:
+def patient_posterior(population: PopulationDraws) -> Posterior:
     """Return the posterior of the material of a patient who has not been measured, without discrepancy.
 
     Parameters that are not pooled, and the noise, are those of a random specimen, from the draw whose pooled parameters
     are nearest to the specimen's.
-
-    Parameters
-    ----------
-    posteriors : sequence of Posterior
-        Of every specimen by itself.
-    complete : Posterior
-        Of all measurements as of one specimen.
-    coordinates : Coordinates
-    hierarchy : Hierarchy
-    new : (chains, draws, d) array
-        The pooled parameters of new patients.
-    covariates : str
-        Those of the patient, in words.
     """
-    full = complete.model
+    coordinates, hierarchy, full = population.coordinates, population.hierarchy, population.complete.model
     used = {p.symbol for p in (*full.material.parameters, *full.noise.parameters)}
     chosen_priors = {symbol: prior for symbol, prior in full.chosen_priors.items() if symbol in used}
     model = StatisticalModel(full.experiment, full.material, NoDiscrepancy(), full.noise, chosen_priors)
     chains, draws, count, size = hierarchy.specimens.shape
     on_line, values = hierarchy.specimens.reshape(-1, count, size), np.empty((chains * draws, len(model.symbols)))
-    for i, posterior in enumerate(posteriors):
+    for i, posterior in enumerate(population.posteriors.values()):
         rows = np.arange(i, chains * draws, count)
         matching = matching_draws(posterior, coordinates, on_line[rows, i])
         is_unknown = np.isin(model.symbols, posterior.model.symbols)
@@ -89,7 +69,7 @@ def patient_posterior(
         values[rows[:, None], np.flatnonzero(is_unknown)], _ = values_of(posterior.model, matching, unknown)
         if len(unknown) < len(model.symbols):  # the noise of this specimen is known
             values[rows[:, None], np.flatnonzero(~is_unknown)] = posterior.model.noise_of_tests[1]
-    values[:, [model.symbols.index(symbol) for symbol in coordinates.symbols]] = new.reshape(-1, size)
+    values[:, [model.symbols.index(symbol) for symbol in coordinates.symbols]] = population.new.reshape(-1, size)
     columns = dict(zip(model.symbols, values.T, strict=True))
     settings, linear = (
         np.array([columns[symbol] for symbol in symbols]).reshape(-1, chains * draws).T
@@ -99,6 +79,7 @@ def patient_posterior(
     mixture = GaussianMixture.of_points(weights, settings, linear)
     support = {parameter.symbol: parameter.support for parameter in model.parameters}
     names = f"{count} specimens, pooled in {', '.join(coordinates.symbols)}"
+    covariates = population.covariates.described(population.patient_covariates)
     names += f" (the patient: {covariates})" * bool(covariates)
     is_exact = full.discrepancy.name == NoDiscrepancy.name
     left_out = "" if is_exact else f", and their model error ({full.discrepancy.name}) is left out"
@@ -112,25 +93,17 @@ def patient_posterior(
         diagnostics=_diagnostics(hierarchy, values.reshape(chains, draws, -1), model.symbols),
         is_of_data=False,
     )
-    return Posterior(solution, complete.solver)
+    return Posterior(solution, population.complete.solver)
 
 
 def patient_band(
-    posteriors: Sequence[Posterior],
-    coordinates: Coordinates,
-    hierarchy: Hierarchy,
-    new: FloatArray,
-    loading: LoadingMode,
-    points: FloatArray,
-    prob: float,
-    **options: Any,
+    population: PopulationDraws, loading: LoadingMode, points: FloatArray, prob: float, **options: Any
 ) -> FloatArray:
     """Return low, median and high (3, g) of the stress of a new specimen, whose model error is a random specimen's.
 
     Parameters
     ----------
-    posteriors, coordinates, hierarchy, new
-        As of `patient_posterior`.
+    population : PopulationDraws
     loading : LoadingMode
         With one control.
     points : (g,) array
@@ -151,10 +124,11 @@ def patient_band(
             f"the stress of a new specimen is predicted in loading modes with one control, and '{loading.name}' has "
             f"{names}."
         )
-    chains, draws, count, size = hierarchy.specimens.shape
-    line_values, patients = hierarchy.specimens.reshape(-1, count, size), new.reshape(-1, size)
+    coordinates, specimens = population.coordinates, population.hierarchy.specimens
+    chains, draws, count, size = specimens.shape
+    line_values, patients = specimens.reshape(-1, count, size), population.new.reshape(-1, size)
     curves = []
-    for i, posterior in enumerate(posteriors):
+    for i, posterior in enumerate(population.posteriors.values()):
         rows = np.arange(i, chains * draws, count)
         matching = matching_draws(posterior, coordinates, line_values[rows, i])
         curves.append(patient_curves(posterior, coordinates, matching, patients[rows], points, mode=loading, **options))

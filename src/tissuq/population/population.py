@@ -16,13 +16,14 @@ from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.parameters.checks import check_probability
-from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, interval
+from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, interval, labelled_arrays
 from tissuq.population.effects import effect_table
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.population.sample_size import needed_table
 from tissuq.population.shared_error import shared_covariance, width_table
 from tissuq.population.warnings import MIN_EFFECTIVE_SHARE, warnings_of
+from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
 
@@ -73,9 +74,7 @@ class Population(PopulationDraws):
         >>> len(patient.ensemble(20))
         20
         """
-        posteriors = tuple(self.posteriors.values())
-        whose = self.covariates.described(self.patient_covariates)
-        return patient_posterior(posteriors, self.complete, self.coordinates, self.hierarchy, self.new, whose)
+        return patient_posterior(self)
 
     @cached_property
     def diagnostics(self) -> NutsDraws:
@@ -255,8 +254,7 @@ class Population(PopulationDraws):
             return self.given(covariates).new_patient(stretch, **of_patient, unit=unit)
         options: dict[str, Any] = {"discrepancy": discrepancy, "mode": mode, "channel": channel}
         loading, points = asked_for([self.complete.solution], stretch, prob=prob, **options)
-        arguments = tuple(self.posteriors.values()), self.coordinates, self.hierarchy, self.new, loading, points, prob
-        low, median, high = patient_band(*arguments, channel=channel, discrepancy=discrepancy)
+        low, median, high = patient_band(self, loading, points, prob, channel=channel, discrepancy=discrepancy)
         table = pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
         return in_unit(table, ["median", "low", "high"], self.unit(unit).name)
 
@@ -297,20 +295,16 @@ class Population(PopulationDraws):
         Groups posterior (of the population and the specimens), new_patient, no_pooling, complete_pooling,
         observed_data and constant_data.
         """
-        from tissuq.population.hierarchy import labelled
+        return tree_of(self._groups)
 
-        labels: dict[str, str | float] = {
-            "spread_prior": f"half-normal({self.spread_prior:g})",
-            "seed": self.seed,
-            "converged": str(self.converged),
-        }
-        labels |= {"shared_discrepancy": "True"} if self.shared_covariance is not None else {}
-        results = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new
-        return labelled(*results, labels, self.covariates)
+    @cached_property
+    def _groups(self) -> dict[str, LabelledGroup]:
+        shared = {"shared_discrepancy": "True"} if self.shared_covariance is not None else {}
+        return labelled_arrays(self, {"converged": str(self.converged)} | shared)
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
-        Path(path).write_bytes(bytes(self.data.to_netcdf(engine="h5netcdf")))
+        save_groups(self._groups, Path(path))
 
     def __repr__(self) -> str:
         material = self.complete.model.material.name

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Group", "LabelledGroup", "opened", "read_groups", "save_groups"]
+__all__ = ["Group", "LabelledGroup", "opened", "read_groups", "save_groups", "tree_of"]
 
 COMPRESSED_SIZE, SAMPLE_SIZE, MAX_SHRUNK_SHARE = 1000, 4000, 0.75
 """Number of values in an array from which it is compressed, if so many of its values then shrink to such a share."""
@@ -105,6 +105,13 @@ def save_groups(groups: Mapping[str, LabelledGroup], path: Path) -> None:
         for name, group in groups.items():
             group.write(file if name == "/" else file.create_group(name, track_order=True))
     path.write_bytes(content.getvalue())
+
+
+def tree_of(groups: Mapping[str, LabelledGroup]) -> xr.DataTree:
+    """Return groups by name, the root's ``"/"``, as a tree of xarray."""
+    import xarray as xr
+
+    return xr.DataTree.from_dict({name: group.to_dataset() for name, group in groups.items()})
 
 
 def read_groups(path: Path, root: str) -> dict[str, Group]:

@@ -33,7 +33,7 @@ from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
 from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries, summaries_in
-from tissuq.posterior.netcdf import LabelledGroup, save_groups
+from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.posterior.plots import PosteriorPlots
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
@@ -518,10 +518,7 @@ class Posterior(PosteriorPlots):
         InputError
             When it is no unit of stress.
         """
-        import xarray as xr
-
-        groups = self._groups(self.unit(unit))
-        return xr.DataTree.from_dict({name: group.to_dataset() for name, group in groups.items()})
+        return tree_of(self._groups(self.unit(unit)))
 
     def _groups(self, unit: StressUnit) -> dict[str, LabelledGroup]:
         headline = summaries(self.solution, parameters=[self.model.headline])[self.model.headline]
