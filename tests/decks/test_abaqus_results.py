@@ -12,7 +12,7 @@ import pytest
 
 from tissuq.decks import AbaqusDeck, CommandSolver, abaqus_results, parse_quantity
 from tissuq.decks.deck import Deck
-from tissuq.decks.model_run import ModelRun, carried_out
+from tissuq.decks.model_run import ModelRun, SolverRun, carried_out
 from tissuq.decks.result_file import Results
 from tissuq.errors import InputError
 
@@ -199,7 +199,7 @@ def test_the_program_is_the_first_word_of_the_command_unless_it_is_named(abaqus,
     task = ModelRun(
         "complete", 0, model, "plate.inp", "abaqus", (("FAT", "*MATERIAL, NAME=FAT\n*ELASTIC\n2., 0.3\n"),),
         CommandSolver(solve), (parse_quantity("pull", "U1@TOP"),), (), tmp_path / "draws" / "one",
-        abaqus=str(abaqus) if named else "",
+        SolverRun(abaqus=str(abaqus) if named else ""),
     )  # fmt: skip
     result = carried_out(task)
     assert (result["problem"], result["misread"]) == ("", "")

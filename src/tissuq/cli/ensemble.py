@@ -47,6 +47,7 @@ class EnsembleOptions(LawOfRun, Configured):
 @command(EnsembleSettings, EnsembleOptions)
 def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     """Run your own finite-element model with draws of a posterior; the same command resumes a stopped ensemble."""
+    from tissuq.decks.model_run import SolverRun
     from tissuq.report.ensemble import ensemble_result
     from tissuq.report.run_folder import check_apart
     from tissuq.report.source_run import check_source
@@ -77,8 +78,8 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
         forget_failures(prepared.tasks(folder), folder)
     with open_pool(how.max_jobs or os.cpu_count() or 1, how.scheduler) as pool:
         study = run_ensemble(
-            prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
-            retries=how.retries, keep=how.keep, abaqus=how.abaqus, progress=call.campaign_in(folder),
+            prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None,
+            running=SolverRun(how.timeout, how.retries, how.keep, how.abaqus), progress=call.campaign_in(folder),
         )  # fmt: skip
     print_explanations(prepared.card_warnings)
     call.put_into(folder, ensemble_result(study, folder, beside), figures=how.figures)

@@ -24,13 +24,42 @@ from tissuq.decks.result_file import ALL, unknown_set
 from tissuq.decks.solver import LOG, CalculiXSolver, Solver
 from tissuq.errors import InputError
 
-__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "check_sets", "clear_unfinished", "problem_of", "sets_of"]
+__all__ = [
+    "DONE", "FIELDS", "USUALLY", "ModelRun", "SolverRun", "carried_out", "check_sets", "clear_unfinished",
+    "problem_of", "sets_of",
+]  # fmt: skip
 
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
 FIELDS = "fields.npz"
 SCRATCH = ".running-"
 """What names of folders begin with in which a solver is at work."""
+
+
+@dataclass(frozen=True)
+class SolverRun:
+    """How the solver is run, on which no number depends.
+
+    Attributes
+    ----------
+    timeout : float, optional
+        Seconds after which it is stopped.
+    retries : int
+        Times that a run which failed is made again.
+    keep : bool
+        Keep its files.
+    abaqus : str
+        The program that opens .odb files; unless given, the first word of the solver's command.
+    """
+
+    timeout: float | None = None
+    retries: int = 0
+    keep: bool = True
+    abaqus: str = ""
+
+
+USUALLY = SolverRun()
+"""How it is run unless anything else is said."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +84,7 @@ class ModelRun:
         The largest I1 - 3 and I2 - 3 that were measured, by materials in capitals.
     folder : Path
         Where the run is left.
-    timeout : float, optional
-        Seconds after which the solver is stopped.
-    retries : int
-        Times that a run which failed is made again.
-    keep : bool
-        Keep the files of the solver.
-    abaqus : str
-        The program that opens .odb files; unless given, the first word of the solver's command.
+    running : SolverRun
     mesh : str
         A digest of the files of the model, where it is another than that of the other runs.
     """
@@ -77,10 +99,7 @@ class ModelRun:
     quantities: tuple[Quantity, ...]
     limits: tuple[tuple[str, tuple[float, float]], ...]
     folder: Path
-    timeout: float | None = None
-    retries: int = 0
-    keep: bool = True
-    abaqus: str = ""
+    running: SolverRun = USUALLY
     mesh: str = ""
 
     @property
@@ -120,14 +139,14 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     components = tuple(
         (quantity.kind, quantity.set_name) for quantity in task.quantities if isinstance(quantity, Component)
     )
-    program = task.abaqus or shlex.quote(task.solver.words(deck.job, deck.main)[0])
+    program = task.running.abaqus or shlex.quote(task.solver.words(deck.job, deck.main)[0])
     is_ring = any(kind == "RF" for kind, _ in components) and deck.format.is_axisymmetric(list(deck.files.values()))
     results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets, components, program, is_ring)
     curves, misread = _curves(task, results)
     elements_beyond = None
     if not misread and not stored["problem"]:
         misread, elements_beyond = _saved_fields(task, results)
-    if not task.keep:
+    if not task.running.keep:
         _strip(task.folder)
     return {**stored, "curves": curves, "misread": misread, "beyond": elements_beyond, "folder": task.folder.name}
 
@@ -207,14 +226,14 @@ def _stored(task: ModelRun) -> dict[str, Any] | None:
 def _solved(task: ModelRun) -> dict[str, Any]:
     start = perf_counter()
     task.folder.parent.mkdir(parents=True, exist_ok=True)
-    for attempt in range(1, task.retries + 2):
+    for attempt in range(1, task.running.retries + 2):
         scratch = Path(mkdtemp(prefix=f"{SCRATCH}{task.folder.name}-", dir=task.folder.parent))
         scratch.chmod(0o755)
         try:
             _lay_out(task, scratch)
             job_folder = scratch / PurePosixPath(task.main).parent
-            outcome = task.solver.run(job_folder, PurePosixPath(task.main).name, task.timeout)
-            if outcome.problem and attempt <= task.retries:
+            outcome = task.solver.run(job_folder, PurePosixPath(task.main).name, task.running.timeout)
+            if outcome.problem and attempt <= task.running.retries:
                 continue
             last_time = task.solver.last_time(job_folder, PurePosixPath(task.main).stem)
             stored = {

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from tissuq.decks import Deck, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_files import MODEL, copy_model, extra_files
-from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, problem_of, sets_of
+from tissuq.decks.model_run import (
+    ModelRun,
+    SolverRun,
+    carried_out,
+    check_sets,
+    clear_unfinished,
+    problem_of,
+    sets_of,
+)
 from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material, points_of_range
@@ -201,8 +209,7 @@ class DeckForward(Forward):
         deck, block = self.read_deck, self._block(parameters)
         task = ModelRun(
             "run", 0, self.folder / MODEL, deck.main, deck.format.name, ((self.replaced, block),), self.program,
-            self.quantities, (), self._place(parameters), self.timeout, self.retries,
-            abaqus=self.abaqus,
+            self.quantities, (), self._place(parameters), SolverRun(self.timeout, self.retries, abaqus=self.abaqus),
         )  # fmt: skip
         result = carried_out(task)
         if result["misread"] and not result["problem"]:

@@ -97,12 +97,10 @@ class SeenStates(PrincipalStates):
         super().__init__(np.concatenate([_ray(max_invariants, np.radians(angle)) for angle in angles]))
 
 
-def states_between(
-    max_invariants: tuple[float, float], factors: tuple[float, float], angles: Sequence[float] = ANGLES
-) -> PrincipalStates:
+def states_between(max_invariants: tuple[float, float], factors: tuple[float, float]) -> PrincipalStates:
     """Return states in which an invariant is between two factors, at least one, of the largest that were measured."""
     low, high = factors
-    logs = SeenStates((high * max_invariants[0], high * max_invariants[1]), angles).logs
+    logs = SeenStates((high * max_invariants[0], high * max_invariants[1])).logs
     largest = np.stack([np.exp(sign * 2 * logs).sum(axis=1) - 3 for sign in (1, -1)], axis=1) / max_invariants
     return PrincipalStates(logs[largest.max(axis=1) > low * (1 + 1e-9)])
 

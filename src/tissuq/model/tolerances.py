@@ -155,9 +155,8 @@ class Tolerances:
         self._errors = {name: kinds[name]() for name in self._sizes}
 
     def __repr__(self) -> str:
-        standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
         sizes = [f"{name}={size!r}" for name, size in self.unusual.items()]
-        return f"Tolerances({', '.join([repr(self.estimand)] * bool(standard) + sizes)})"
+        return f"Tolerances({', '.join([repr(self.estimand)] * bool(self._standard) + sizes)})"
 
     def __eq__(self, value: object) -> bool:
         return isinstance(value, Tolerances) and (self.estimand, self._sizes) == (value.estimand, value._sizes)
@@ -185,9 +184,13 @@ class Tolerances:
     @property
     def unusual(self) -> dict[str, float]:
         """The sizes that are not those of the estimand."""
-        standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
         sizes = {name: self._sizes.get(name, 0.0) for name in measurement_errors()}
-        return {name: size for name, size in sizes.items() if size != standard.get(name, 0.0)}
+        return {name: size for name, size in sizes.items() if size != self._standard.get(name, 0.0)}
+
+    @property
+    def _standard(self) -> Mapping[str, float]:
+        """The sizes of the estimand."""
+        return ESTIMANDS[self.estimand].sizes if self.estimand else {}
 
     def meaning(self, experiment: Experiment) -> str:
         """Return what an interval of data with these errors is of, in words."""
@@ -279,8 +282,7 @@ class Tolerances:
     @property
     def has_standard_spreads(self) -> bool:
         """Whether the spreads between specimens and tests are those of the estimand, not stated by themselves."""
-        standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
-        names = ScaleError.name, TestError.name
+        standard, names = self._standard, (ScaleError.name, TestError.name)
         is_stated = bool(self._numbers & {*names})
         is_standard = all(self._sizes.get(name, 0.0) == standard.get(name, 0.0) for name in names)
         return bool(standard) and is_standard and not is_stated

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
 from tissuq.decks.model_files import MODEL, extra_files
-from tissuq.decks.model_run import ModelRun, carried_out, check_sets, clear_unfinished, sets_of
+from tissuq.decks.model_run import USUALLY, ModelRun, SolverRun, carried_out, check_sets, clear_unfinished, sets_of
 from tissuq.decks.quantity import located
 from tissuq.errors import InputError
 from tissuq.export import Cards, card_format, check_fibres
@@ -75,9 +75,7 @@ class PreparedEnsemble:
         """Return the difference between the model and that of a draw."""
         return self.deck.diff(self.deck.with_materials(self.blocks(COMPLETE, number)))
 
-    def tasks(
-        self, folder: Path, *, timeout: float | None = None, retries: int = 0, keep: bool = True, abaqus: str = ""
-    ) -> list[ModelRun]:
+    def tasks(self, folder: Path, running: SolverRun = USUALLY) -> list[ModelRun]:
         """Return the runs: the complete draws first, that on a finer mesh last."""
         limits = tuple(
             (self.deck.material(name).name.upper(), ensemble.most) for name, ensemble in self.ensembles.items()
@@ -88,7 +86,7 @@ class PreparedEnsemble:
             return ModelRun(
                 family, number, model_folder / MODEL, deck.main, deck.format.name,
                 tuple(self.blocks(cards_of, number).items()), self.solver, self.quantities, limits,
-                folder / DRAWS / f"{family}-{number + 1:0{width}d}", timeout, retries, keep, abaqus,
+                folder / DRAWS / f"{family}-{number + 1:0{width}d}", running,
                 "" if deck is self.deck else deck.digest,
             )  # fmt: skip
 
@@ -158,7 +156,7 @@ def prepare_ensemble(
     if runs_here:
         solver.check_installed()
     extra_files(deck, settings.also, beside)
-    quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
+    quantities = tuple(parse_quantity(name, located(text, beside)) for name, text in settings.quantities.items())
     replaced = {name: deck.material(name) for name in settings.materials}
     if len(set(replaced.values())) < len(replaced):
         raise InputError(f"--replace names one material of the model twice: {', '.join(replaced)}.")
@@ -225,10 +223,7 @@ def run_ensemble(
     *,
     pool: Executor | None = None,
     limit: int | None = None,
-    timeout: float | None = None,
-    retries: int = 0,
-    keep: bool = True,
-    abaqus: str = "",
+    running: SolverRun = USUALLY,
     progress: Callable[[int], AbstractContextManager[Step]] = lambda total: nullcontext(silent),
 ) -> EnsembleStudy:
     """Run the solver for every draw, those in ``folder`` not again, and gather what they give.
@@ -245,14 +240,8 @@ def run_ensemble(
         From `tissuq.studies.stream.open_pool`.
     limit : int, optional
         Runs at the same time.
-    timeout : float, optional
-        Seconds after which a run is stopped.
-    retries : int
-        Times that a run which failed is made again.
-    keep : bool
-        Keep the files of the solver.
-    abaqus : str
-        The program that opens .odb files; unless given, the first word of the solver's command.
+    running : SolverRun
+        How the solver is run.
     progress : callable
         Gives, for a number of tasks, a context with the function that is told of each.
 
@@ -262,7 +251,7 @@ def run_ensemble(
         When a quantity cannot be read, or hardly any draw gets anywhere.
     """
     clear_unfinished(folder / DRAWS)
-    tasks = prepared.tasks(folder.absolute(), timeout=timeout, retries=retries, keep=keep, abaqus=abaqus)
+    tasks = prepared.tasks(folder.absolute(), running)
     unique = list({task.key: task for task in tasks}.values())
     with progress(len(unique)) as step:
         for task in unique[:1] if prepared.finer is None else (unique[0], unique[-1]):
@@ -301,7 +290,3 @@ def _check_functions(quantities: tuple[Quantity, ...]) -> None:
                     f"two files of quantities are called '{file.name}' (--qoi): '{earlier_file}' and '{file}'; "
                     "rename one."
                 )
-
-
-def _quantity(name: str, text: str, beside: Path) -> Quantity:
-    return parse_quantity(name, located(text, beside))

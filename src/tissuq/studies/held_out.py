@@ -68,7 +68,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     return pd.DataFrame(rows)
 
 
-def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) -> list[dict[str, Any]]:
+def prediction_of(posterior: Posterior, test: Experiment) -> list[dict[str, Any]]:
     """Return how a posterior predicts a test that it has not seen, a row for each of its stresses.
 
     Returns
@@ -81,7 +81,7 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
     """
     measured, rows = measured_states(posterior.model, is_directed=posterior.solution.is_directed), []
     for curve in test.curves:
-        judged_all = judged(posterior.solution, curve, prob=prob)
+        judged_all = judged(posterior.solution, curve)
         calibrated = measured.contain(curve.path.at(judged_all.points))
         labels: dict[str, Any] = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity}
         shares = {"inside": float(judged_all.is_inside.mean()), "beyond": float(1 - calibrated.mean())}
