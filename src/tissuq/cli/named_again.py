@@ -41,7 +41,7 @@ def check_named_again(
     InputError
         When there are some; the message has the options to type.
     """
-    from tissuq.mechanics.user_law import LAW
+    from tissuq.mechanics.user_law import UserCode
 
     missing = []
     if not is_dry:
@@ -49,7 +49,7 @@ def check_named_again(
             missing.append(f"--command {shlex.quote(settings.command)}")
         for setting, option in quantities.items():
             for name, text in getattr(settings, setting).items():
-                if LAW.fullmatch(text) and name not in stated.get(setting, {}):
+                if UserCode.named(text) and name not in stated.get(setting, {}):
                     missing.append(f"{option} {shlex.quote(f'{name}={text}')}")
     inside = config.parent.resolve()
     if "also" not in stated and not all(is_inside(inside / file, inside) for file in settings.also):

@@ -6,7 +6,6 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from tissuq.decks.result_file import ALL, TENSOR, Results, result_files
 from tissuq.errors import InputError
-from tissuq.mechanics.user_law import LAW, failures_of, run_file
+from tissuq.mechanics.user_law import UserCode
 
 __all__ = [
     "Component",
@@ -179,29 +178,22 @@ class FunctionQuantity(Quantity):
         return self.location
 
     @property
-    def _path(self) -> Path:
-        match = LAW.fullmatch(self.location)
-        assert match is not None  # noqa: S101 (as it was parsed)
-        return Path(match["path"])
+    def _code(self) -> UserCode:
+        code = UserCode.named(self.location)
+        assert code is not None  # noqa: S101 (as it was parsed)
+        return code
 
     @property
     def identity(self) -> str:
-        return f"{self.location} {sha256(self._path.read_bytes()).hexdigest()[:16]}"
+        return f"{self.location} {self._code.digest}"
 
     def check(self) -> None:
         self._function()
 
     def _function(self) -> Callable[[Path], object]:
-        name = self.location.rpartition(":")[2]
-        if not self._path.is_file():
-            raise InputError(f"quantity '{self.name}': there is no file '{self._path}'.")
-        with failures_of(self._path):
-            function = getattr(run_file(self._path), name, None)
-        if not callable(function):
-            raise InputError(
-                f"'{self._path}' has no function named '{name}'. Write {name}(folder) of the draw's folder."
-            )
-        return function  # type: ignore[no-any-return]
+        path, name = self._code
+        missing = f"quantity '{self.name}': there is no file '{path}'."
+        return self._code.function(missing, f"Write {name}(folder) of the draw's folder")
 
     def read(self, results: Results) -> Curve:
         function = self._function()
@@ -223,8 +215,8 @@ class FunctionQuantity(Quantity):
 
 def located(text: str, beside: Path) -> str:
     """Return the text of a quantity, where it is a function with its file in a folder, by an absolute name."""
-    match = LAW.fullmatch(text)
-    return text if match is None else f"{(beside / match['path']).absolute()}:{match['name']}"
+    code = UserCode.named(text)
+    return text if code is None else f"{(beside / code.path).absolute()}:{code.name}"
 
 
 def parse_quantity(name: str, text: str) -> Quantity:
@@ -243,7 +235,7 @@ def parse_quantity(name: str, text: str) -> Quantity:
     """
     if not name.replace("_", "").replace("-", "").isalnum():
         raise InputError(f"'{name}' cannot name a quantity: use letters, digits, _ and -.")
-    if LAW.fullmatch(text):
+    if UserCode.named(text):
         return FunctionQuantity(name, text)
     match = SPECIFICATION.fullmatch(text.strip())
     word = match["component"].upper() if match else ""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.mechanics.user_law import LAW, failures_of, run_file
+from tissuq.mechanics.user_law import UserCode
 
 __all__ = [
     "DEFAULT_URL",
@@ -93,7 +93,7 @@ class CallableForward(Forward):
             text = inspect.getsource(self.function)
         except (OSError, TypeError):
             text = ""
-        return f"{getattr(self.function, '__module__', '')}.{name} {_digest(text.encode())}"
+        return f"{getattr(self.function, '__module__', '')}.{name} {sha256(text.encode()).hexdigest()[:16]}"
 
 
 @dataclass(frozen=True)
@@ -110,17 +110,14 @@ class FileForward(Forward):
 
     @property
     def identity(self) -> str:
-        match = LAW.fullmatch(self.location)
-        if match is None:
-            return self.location
-        path = Path(match["path"])
-        return f"{path.name}:{match['name']} {_digest(path.read_bytes())}"
+        code = UserCode.named(self.location)
+        return f"{code.path.name}:{code.name} {code.digest}" if code else self.location
 
     @property
     def file(self) -> Path | None:
         """The user's file, where it is one."""
-        match = LAW.fullmatch(self.location)
-        return Path(match["path"]) if match else None
+        code = UserCode.named(self.location)
+        return code.path if code else None
 
     def check(self, symbols: Sequence[str]) -> None:
         _function_at(self.location)
@@ -254,17 +251,10 @@ def _takes_control(function: Callable[..., Any]) -> bool:
 @lru_cache
 def _function_at(location: str) -> Callable[..., Any]:
     """Return the function that the user named; runs its file."""
-    match = LAW.fullmatch(location)
-    if match is None:
+    code = UserCode.named(location)
+    if code is None:
         return _function_of_module(location)
-    path, name = Path(match["path"]), match["name"]
-    if not path.is_file():
-        raise InputError(f"there is no file '{path}' for the forward model '{location}'.")
-    with failures_of(path):
-        function = getattr(run_file(path), name, None)
-    if not callable(function):
-        raise InputError(f"'{path}' has no function named '{name}'. {ADVICE}.")
-    return function  # type: ignore[no-any-return]
+    return code.function(f"there is no file '{code.path}' for the forward model '{location}'.", ADVICE)
 
 
 def _function_of_module(location: str) -> Callable[..., Any]:
@@ -278,10 +268,6 @@ def _function_of_module(location: str) -> Callable[..., Any]:
     if not callable(function):
         raise InputError(f"module '{module}' has no function named '{name}'. {ADVICE}.")
     return function  # type: ignore[no-any-return]
-
-
-def _digest(content: bytes) -> str:
-    return sha256(content).hexdigest()[:16]
 
 
 DEFAULT_URL = "http://localhost:4242"

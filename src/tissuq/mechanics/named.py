@@ -7,7 +7,7 @@ from tissuq.mechanics.laws.fibres import FibreMaterial
 from tissuq.mechanics.laws.polynomial import Rivlin
 from tissuq.mechanics.laws.separable import Ogden
 from tissuq.mechanics.material import Material, MaterialSum
-from tissuq.mechanics.user_law import LAW, as_material, load_material
+from tissuq.mechanics.user_law import UserCode, as_material, load_material
 from tissuq.registry import find, load_plugins, variants
 
 __all__ = ["FORMS", "material_named", "plugins"]
@@ -57,7 +57,7 @@ def material_named(material: str | Material, *, laws: bool = False) -> Material:
 
 
 def _single(name: str, laws: bool) -> Material:
-    if LAW.fullmatch(name):
+    if UserCode.named(name):
         if laws:
             return load_material(name)
         raise ModelError(

@@ -1,4 +1,4 @@
-"""A law of the user's own in a file that the user names, and the checks that it and every material must pass."""
+"""Code in a file that the user names, a law among it, and the checks that it and every material must pass."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from hashlib import sha256
 from importlib.util import module_from_spec, spec_from_file_location
 from math import inf
 from pathlib import Path
 from traceback import extract_tb
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +38,10 @@ __all__ = [
     "LAW",
     "Check",
     "FunctionLaw",
+    "UserCode",
     "as_material",
     "checked",
-    "failures_of",
     "load_material",
-    "run_file",
     "values_within_reach",
 ]
 
@@ -164,19 +164,16 @@ def load_material(law: str) -> Material:
     InputError
         When there is no such file or name, or what it names fails or is no material.
     """
-    match = LAW.fullmatch(law)
-    if match is None:
+    code = UserCode.named(law)
+    if code is None:
         raise InputError(f"'{law}' does not name a law in a file: write path.py:Name.")
-    path, name = Path(match["path"]), match["name"]
-    if not path.is_file():
-        raise InputError(f"there is no file '{path}' for the material '{law}'.")
-    with failures_of(path):
-        module = run_file(path)
+    path, name = code
+    module = code.module(f"there is no file '{path}' for the material '{law}'.")
     if not hasattr(module, name):
         is_defined = {key: getattr(thing, "__module__", None) == module.__name__ for key, thing in vars(module).items()}
         names = [key for key, is_here in is_defined.items() if is_here]
         raise InputError(f"'{path}' has nothing named '{name}'; it defines {', '.join(names) or 'nothing'}.")
-    with failures_of(path):
+    with _failures_of(path):
         material = as_material(getattr(module, name), law)
         checks = checked(material)
     failed = [f"{check.claim} ({check.problem})" for check in checks if check.problem]
@@ -208,8 +205,39 @@ def as_material(law: Any, source: str) -> Material:
         raise InputError(f"the material '{source}' cannot be made without arguments: {error}.") from error
 
 
-def run_file(path: Path) -> Any:
-    """Return the module that a user's file makes when it is run."""
+class UserCode(NamedTuple):
+    """Something in a file of the user's, which is written ``path.py:Name``."""
+
+    path: Path
+    name: str
+
+    @classmethod
+    def named(cls, text: str) -> Self | None:
+        """Return what a text names; None where that is nothing in a file."""
+        match = LAW.fullmatch(text)
+        return cls(Path(match["path"]), match["name"]) if match else None
+
+    @property
+    def digest(self) -> str:
+        """A text that changes with the file."""
+        return sha256(self.path.read_bytes()).hexdigest()[:16]
+
+    def module(self, missing: str) -> Any:
+        """Return the module that the file makes when it is run; an InputError, ``missing`` where there is no file."""
+        if not self.path.is_file():
+            raise InputError(missing)
+        with _failures_of(self.path):
+            return _run(self.path)
+
+    def function(self, missing: str, advice: str) -> Callable[..., Any]:
+        """Return the function of that name; an InputError, as of `module`, or with advice where there is none."""
+        function = getattr(self.module(missing), self.name, None)
+        if not callable(function):
+            raise InputError(f"'{self.path}' has no function named '{self.name}'. {advice}.")
+        return function  # type: ignore[no-any-return]
+
+
+def _run(path: Path) -> Any:
     spec = spec_from_file_location(f"tissuq_law_{path.stem}", path)
     assert spec is not None  # noqa: S101 (a file that ends with .py has a loader)
     assert spec.loader is not None  # noqa: S101
@@ -220,7 +248,7 @@ def run_file(path: Path) -> Any:
 
 
 @contextmanager
-def failures_of(path: Path) -> Iterator[None]:
+def _failures_of(path: Path) -> Iterator[None]:
     """Raise in one sentence what failed in the user's file, and in which line."""
     try:
         yield
