@@ -29,6 +29,14 @@ MANY = np.linspace(0.6, 2.0, 500_000)
 EVERY_STRESS = pytest.mark.parametrize("measured", MEASURED, ids=str)
 
 
+class LikeNeoHookean(StretchMaterial):
+    """What laws of these tests say of themselves."""
+
+    parameters = (tq.Parameter("mu", "shear modulus"),)
+    formula = "mu / 2 (I1 - 3)"
+    source = "this file"
+
+
 def test_several_settings_give_several_bases():
     settings = np.array([[1.3, -2.0], [5.0, -0.7], [20.0, -20.0]])
     bases = stress_basis(Ogden2(), Uniaxial().at(STRETCH), settings)
@@ -104,13 +112,10 @@ def test_the_compiled_normal_stress_of_no_shear_is_nothing_although_two_stretche
 
 
 def test_what_an_imaginary_step_cannot_differentiate_is_left_to_jax():
-    class WithAbsolute(StretchMaterial):
+    class WithAbsolute(LikeNeoHookean):
         """Neo-Hookean, in a way that loses the imaginary part."""
 
-        parameters = (tq.Parameter("mu", "shear modulus"),)
         name = "with-absolute"
-        formula = "mu / 2 |I1 - 3|"
-        source = "this test"
 
         def energy(self, stretches, values):
             return 0.5 * values[0] * abs(sum(stretch**2 for stretch in stretches) - 3) + 0 * stretches[0]
@@ -158,13 +163,10 @@ def test_stretches_that_the_caller_changes_are_computed_anew():
 
 
 def test_a_law_that_writes_to_the_stretches_changes_nobody_elses():
-    class Writing(StretchMaterial):
+    class Writing(LikeNeoHookean):
         """Neo-Hookean, with the squares in place of the stretches."""
 
-        parameters = (tq.Parameter("mu", "shear modulus"),)
         name = "writing"
-        formula = "mu / 2 (I1 - 3)"
-        source = "this test"
 
         def energy(self, stretches, values):
             squares = 0.0

@@ -78,58 +78,42 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
         Experiment.of([reading.experiment for reading in readings]),
     )
     target = call.target(Path("runs") / run_name(paths, call.config, sources))
-    if isinstance(settings, LawSettings):
-        _compare_laws(call, settings, laws_of_names, readings, sources, target)
-    else:
-        _fit_one(call, settings, next(iter(laws_of_names.values()), None), readings, sources, target)
+    study = _fitted(call, settings, laws_of_names, readings, sources, target)
+    for name, reason in study.skipped.items():
+        print(f"Not fitted: {name}: {reason}")
+    not_converged(study.not_converged)
 
 
-def _fit_one(
+def _fitted(
     call: Call[SpecimenSettings, FitOptions],
     settings: SpecimenSettings,
-    law: Material | None,
+    user_laws: dict[str, Material],
     readings: list[Reading],
     sources: list[Path],
     target: Path,
-) -> None:
-    """Fit one material, write the run and print its summary."""
+) -> SpecimenStudy | LawStudy:
+    """Fit one material, or several laws; write the run and print its summary."""
+    if isinstance(settings, LawSettings):
+        from tissuq.report.laws import law_result
+        from tissuq.studies.laws import run_laws
+
+        of_laws: LawStudy = call.carried_out(
+            target,
+            lambda step: run_laws(settings, call.beside, step, user_laws, readings, call.how.workers),
+            partial(law_result, sources=sources),
+        )
+        return of_laws
     from tissuq.report.specimen import specimen_result
     from tissuq.studies.specimen import run_specimen, steps_of
 
-    study = call.carried_out(
+    law = next(iter(user_laws.values()), None)
+    of_material: SpecimenStudy = call.carried_out(
         target,
         lambda step: run_specimen(settings, call.beside, step, law, readings),
         partial(specimen_result, sources=sources),
         steps_of(settings) + 1,
     )
-    _print_omissions(study)
-
-
-def _compare_laws(
-    call: Call[SpecimenSettings, FitOptions],
-    settings: LawSettings,
-    user_laws: dict[str, Material],
-    readings: list[Reading],
-    sources: list[Path],
-    target: Path,
-) -> None:
-    """Fit several laws, write the run and print their table."""
-    from tissuq.report.laws import law_result
-    from tissuq.studies.laws import run_laws
-
-    study = call.carried_out(
-        target,
-        lambda step: run_laws(settings, call.beside, step, user_laws, readings, call.how.workers),
-        partial(law_result, sources=sources),
-    )
-    _print_omissions(study)
-
-
-def _print_omissions(study: SpecimenStudy | LawStudy) -> None:
-    """Print what could not be fitted; say what has not converged."""
-    for name, reason in study.skipped.items():
-        print(f"Not fitted: {name}: {reason}")
-    not_converged(study.not_converged)
+    return of_material
 
 
 def _check_once(specimens: Sequence[str], modes: Sequence[str] | None, noise: Sequence[float | str] | None) -> None:

@@ -156,11 +156,8 @@ class OgdenFit(Projection):
         return _on_ladders(self.terms, states)
 
 
-@dataclass(frozen=True)
-class MixtureFit(Projection):
+class MixtureFit(OgdenFit):
     """A polynomial of I1 and an Ogden sum added, each of so many terms, for a code that adds materials."""
-
-    terms: int
 
     family = "mixture"
 
@@ -169,16 +166,12 @@ class MixtureFit(Projection):
         return cls(_checked(order, MAX_REDUCED_ORDER, "a mixture"))
 
     @property
-    def order(self) -> int:
-        return self.terms
-
-    @property
     def material(self) -> Material:
         return Rivlin(reduced_terms(self.terms)) + Ogden(self.terms)
 
     def candidates(self, states: PrincipalStates) -> Iterator[Candidate]:
         polynomial, polynomial_moduli = _columns(Rivlin(reduced_terms(self.terms)), states, ())
-        for ogden in _on_ladders(self.terms, states):
+        for ogden in super().candidates(states):
             unit_moduli = np.concatenate([polynomial_moduli, ogden.unit_moduli])
             yield Candidate(ogden.setting, np.hstack([polynomial, ogden.columns]), unit_moduli)
 

@@ -19,6 +19,7 @@ from tissuq.model.tolerances import AS_TESTED
 from tissuq.parameters.priors import Prior, Uniform, prior_from
 from tissuq.posterior.fitting import fit, fit_many
 from tissuq.posterior.posterior import Posterior
+from tissuq.posterior.solver import Method
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity, merged
 from tissuq.studies.campaign_settings import PaperOptions
@@ -97,6 +98,11 @@ class PaperSettings(PaperOptions):
         parameters = (*NeoHookean.parameters, *discrepancy_named(formulation).parameters)
         return {p.symbol: prior_from(self.priors[p.symbol]) for p in parameters}
 
+    def options_of(self, formulation: str, **priors: Prior) -> dict[str, Any]:
+        """Return the options of a fit with a formulation; ``priors`` replace those of its parameters."""
+        own = {"discrepancy": formulation, "priors": self.priors_of(formulation) | priors}
+        return own | {"noise_sd": self.noise_sd, "tolerances": AS_TESTED}
+
 
 RANGES = ((0.5, 4.25), (0.5, 3.0), (0.6, 2.0), (1.0, 4.25))
 AMPLITUDE_BOUNDS = (1.0, 10.0)
@@ -146,15 +152,9 @@ def ranges_of(settings: PaperSettings) -> list[tuple[float, float]]:
 
 
 def _fitted(settings: PaperSettings, formulation: str, bound: float | None) -> Cell:
-    priors = settings.priors_of(formulation) | ({} if bound is None else {"c": Uniform(0, bound)})
-    posteriors = fit_many(
-        [settings.experiment(replicate) for replicate in range(settings.replicates)],
-        discrepancy=formulation,
-        noise_sd=settings.noise_sd,
-        priors=priors,
-        tolerances=AS_TESTED,
-        method="exact",
-    )
+    options = settings.options_of(formulation, **{} if bound is None else {"c": Uniform(0, bound)})
+    experiments = [settings.experiment(replicate) for replicate in range(settings.replicates)]
+    posteriors = fit_many(experiments, method="exact", **options)
     intervals = [posterior.solution.marginals["C10"].hdi() for posterior in posteriors]
     held = sum(low <= settings.truth["C10"] <= high for low, high in intervals)
     return Cell(settings.stretch_low, settings.stretch_high, formulation, bound, held, settings.replicates)
@@ -231,15 +231,7 @@ def _find_in_replicates(settings: PaperSettings, step: Callable[[str], None]) ->
     bases: list[Band] = []
     for name in FORMULATIONS:
         step(f"{settings.replicates - 1} more data sets: {name}")
-        posteriors = fit_many(
-            experiments,
-            discrepancy=name,
-            noise_sd=settings.noise_sd,
-            priors=settings.priors_of(name),
-            tolerances=AS_TESTED,
-            method="exact",
-            seed=settings.seed,
-        )
+        posteriors = fit_many(experiments, method="exact", seed=settings.seed, **settings.options_of(name))
         if not bases:
             bases = [predict_band(fit.solution, fit.model.experiment.stretch) for fit in posteriors]
         for findings, posterior, base in zip(findings_by_data_set, posteriors, bases, strict=True):
@@ -258,15 +250,8 @@ def _fit_all(
     for name in FORMULATIONS:
         step(f"{name} ({sampler})")
         start = perf_counter()
-        posterior = fit(
-            experiment,
-            discrepancy=name,
-            noise_sd=settings.noise_sd,
-            priors=settings.priors_of(name),
-            tolerances=AS_TESTED,
-            method="joint" if sampler == "nuts" else "exact",
-            seed=settings.seed,
-        )
+        method: Method = "joint" if sampler == "nuts" else "exact"
+        posterior = fit(experiment, method=method, seed=settings.seed, **settings.options_of(name))
         seconds = perf_counter() - start
         base = base or predict_band(posterior.solution, experiment.stretch)
         fitted[name] = Fitted(name, posterior, find(posterior, settings.truth["C10"], base), seconds)
