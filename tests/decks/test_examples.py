@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 import tissuq as tq
 from tissuq.decks import Deck, parse_quantity
-from tissuq.decks.abaqus import node_sets
+from tissuq.decks.abaqus import AbaqusDeck
 from tissuq.decks.calculix_results import read_frd
 from tissuq.decks.fields import element_invariants, final_fields, share_beyond
 from tissuq.decks.model_run import ModelRun, carried_out
@@ -73,7 +73,8 @@ def mesh_of(deck):
     points = np.array([[float(word) for word in line.split(",")[1:]] for line in nodes.splitlines()])
     numbers = np.array([int(word) for word in re.findall(r"\d+", elements)]).reshape(-1, 21)
     sets = {
-        name: np.isin(np.arange(len(points)) + 1, sorted(each)) for name, each in node_sets([text.encode()]).items()
+        name: np.isin(np.arange(len(points)) + 1, sorted(each))
+        for name, each in AbaqusDeck().node_sets([text.encode()]).items()
     }
     return points, numbers[:, 1:] - 1, sets
 

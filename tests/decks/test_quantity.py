@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from tissuq.decks import Deck, parse_quantity
-from tissuq.decks.abaqus import node_sets
+from tissuq.decks.abaqus import AbaqusDeck
 from tissuq.decks.calculix_results import CalculiXResults, Frd
 from tissuq.decks.deck import deck_formats
 from tissuq.decks.model_run import check_sets
 from tissuq.decks.quantity import Results
-from tissuq.decks.solver import solver_named
+from tissuq.decks.solver import solver_for
 from tissuq.errors import InputError
 
 TABLES = """
@@ -175,13 +175,13 @@ def test_the_number_of_elements_and_their_dimensions_are_known_from_the_deck_or_
 def test_sets_of_nodes_are_those_of_the_manual():
     deck = b"*NODE, NSET=All\n1, 0., 0., 0.\n2, 0., 0., 0.\n*NSET, NSET=Some\n1,\n*nset, nset=Row, generate\n2, 8, 3\n"
     deck += b"*NSET, NSET=BOTH\nSome, 9\nrow\n"
-    assert node_sets([deck]) == {"ALL": {1, 2}, "SOME": {1}, "ROW": {2, 5, 8}, "BOTH": {1, 2, 5, 8, 9}}
+    assert AbaqusDeck().node_sets([deck]) == {"ALL": {1, 2}, "SOME": {1}, "ROW": {2, 5, 8}, "BOTH": {1, 2, 5, 8, 9}}
 
 
 def test_sets_may_name_those_of_later_files_and_one_another():
     files = [b"*NSET, NSET=A\nB, 1\n*NSET, NSET=C\nA\n", b"*NSET, NSET=B\n2\n"]
-    assert node_sets(files) == {"A": {1, 2}, "B": {2}, "C": {1, 2}}
-    assert node_sets([b"*NSET, NSET=A\nB, 1\n*NSET, NSET=B\nA, 2\n"]) == {"A": {1, 2}, "B": {1, 2}}
+    assert AbaqusDeck().node_sets(files) == {"A": {1, 2}, "B": {2}, "C": {1, 2}}
+    assert AbaqusDeck().node_sets([b"*NSET, NSET=A\nB, 1\n*NSET, NSET=B\nA, 2\n"]) == {"A": {1, 2}, "B": {1, 2}}
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_sets_may_name_those_of_later_files_and_one_another():
 )
 def test_sets_that_are_not_understood_are_named(content, words):
     with pytest.raises(InputError, match=words):
-        node_sets([content])
+        AbaqusDeck().node_sets([content])
 
 
 @pytest.mark.parametrize("text", ["U1@TOP", "U@TOP", "S11@EALL"])
@@ -231,5 +231,5 @@ def test_a_set_of_elements_is_refused_where_calculix_is_not_asked_to_print_it(tm
     (tmp_path / "model.inp").write_text(f"{mesh}*MATERIAL, NAME=A\n*STEP\n{printed}*END STEP\n")
     deck, quantities = Deck.read(tmp_path / "model.inp"), [parse_quantity("q", wanted)]
     with nullcontext() if is_written else pytest.raises(InputError, match="'BODY' is a set of elements"):
-        check_sets(deck, quantities, solver_named("ccx"))
+        check_sets(deck, quantities, solver_for("abaqus", "ccx"))
     check_sets(deck, quantities)

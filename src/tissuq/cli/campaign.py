@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
+from tissuq.studies.settings import RECIPE
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -26,10 +27,12 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
     InputError
         When it is neither.
     """
-    from tissuq.report.run_folder import RECIPE
+    from tissuq.studies.stream import unfinished
 
     recipe = folder / RECIPE
-    if not folder.exists() or (folder.is_dir() and {path.name for path in folder.iterdir()} <= {_unfinished(recipe)}):
+    if not folder.exists() or (
+        folder.is_dir() and {path.name for path in folder.iterdir()} <= {unfinished(recipe).name}
+    ):
         return
     if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
@@ -44,16 +47,10 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
 
 def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
     """Write the recipe atomically, so that a killed campaign can be resumed."""
-    from tissuq.report.run_folder import RECIPE
+    from tissuq.studies.stream import write_whole
 
     folder.mkdir(parents=True, exist_ok=True)
-    scratch = folder / _unfinished(folder / RECIPE)
-    scratch.write_text(_recipe(settings), encoding="utf-8")
-    scratch.replace(folder / RECIPE)
-
-
-def _unfinished(recipe: Path) -> str:
-    return f"{recipe.name}.new"
+    write_whole(folder / RECIPE, _recipe(settings))
 
 
 def _without(recipe: str, names: frozenset[str]) -> dict[str, Any]:

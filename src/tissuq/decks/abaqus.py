@@ -111,7 +111,41 @@ class AbaqusDeck(DeckFormat):
         return block.partition("\n")[2]
 
     def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
-        return node_sets(files)
+        """Return the sets of nodes that decks define, by their names in capitals, in whatever order they stand.
+
+        Raises
+        ------
+        InputError
+            When a set names one that no file defines, or its numbers are not understood.
+        """
+        sets: dict[str, set[int]] = {}
+        references: dict[str, set[str]] = {}
+        for content in files:
+            for keyword in keywords_of(content):
+                name = keyword.parameters.get("NSET", "").upper()
+                if keyword.name not in ("NSET", "NODE") or not name:
+                    continue
+                members, names = sets.setdefault(name, set()), references.setdefault(name, set())
+                try:
+                    numbers, referenced = _members(keyword)
+                except (ValueError, TypeError) as error:
+                    raise InputError(
+                        f"the numbers of the set of nodes '{name}' are not understood ({error})."
+                    ) from error
+                members |= numbers
+                names |= referenced
+        gone = _of_instances(references)
+        for name in gone:
+            del sets[name], references[name]
+        for name, referenced in references.items():
+            for unknown in sorted(referenced - set(sets)):
+                raise InputError(f"the set of nodes '{name}' has '{unknown}', which no file of the deck defines.")
+        while any(
+            not sets[reference] <= sets[name] for name, referenced in references.items() for reference in referenced
+        ):
+            for name, referenced in references.items():
+                sets[name].update(*(sets[reference] for reference in referenced))
+        return sets
 
     def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
         wanted = NAMES_OF_SETS + NAMES_OF_ELEMENT_SETS * of_elements
@@ -164,40 +198,6 @@ def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:
         elif option.name in ENDS or option.name.endswith("SECTION"):
             break
     return DeckMaterial(head.parameters.get("NAME", ""), "", tuple(spans or [(head.end, head.end)]), refused=refused)
-
-
-def node_sets(files: Sequence[bytes]) -> dict[str, set[int]]:
-    """Return the sets of nodes that decks define, by their names in capitals, in whatever order they stand.
-
-    Raises
-    ------
-    InputError
-        When a set names one that no file defines, or its numbers are not understood.
-    """
-    sets: dict[str, set[int]] = {}
-    references: dict[str, set[str]] = {}
-    for content in files:
-        for keyword in keywords_of(content):
-            name = keyword.parameters.get("NSET", "").upper()
-            if keyword.name not in ("NSET", "NODE") or not name:
-                continue
-            members, names = sets.setdefault(name, set()), references.setdefault(name, set())
-            try:
-                numbers, referenced = _members(keyword)
-            except (ValueError, TypeError) as error:
-                raise InputError(f"the numbers of the set of nodes '{name}' are not understood ({error}).") from error
-            members |= numbers
-            names |= referenced
-    gone = _of_instances(references)
-    for name in gone:
-        del sets[name], references[name]
-    for name, referenced in references.items():
-        for unknown in sorted(referenced - set(sets)):
-            raise InputError(f"the set of nodes '{name}' has '{unknown}', which no file of the deck defines.")
-    while any(not sets[reference] <= sets[name] for name, referenced in references.items() for reference in referenced):
-        for name, referenced in references.items():
-            sets[name].update(*(sets[reference] for reference in referenced))
-    return sets
 
 
 def _of_instances(references: Mapping[str, set[str]]) -> set[str]:

@@ -66,7 +66,7 @@ class AbaqusResults(ResultFile):
         if field is None:
             return None
         width = len(TENSOR) if kind == "S" else 3
-        is_within = np.array(field["times"]) <= self.results.last_time * (1 + 1e-5)
+        is_within = self.results.reach(np.array(field["times"]))
         rows = [[row or [np.nan] * width for row in rows] for rows in field["rows"]]
         return Values(np.array(field["times"])[is_within], np.array(rows, dtype=np.float64)[is_within])
 

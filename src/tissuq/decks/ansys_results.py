@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.result_file import ResultFile, Values
+from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
 
 __all__ = ["AnsysResults"]
@@ -19,8 +19,6 @@ FloatArray = NDArray[np.float64]
 
 WRITTEN = {"U": ("NSL", "ptrNSL"), "RF": ("RF", "ptrRF"), "S": ("ENS", "ptrESL")}
 """What the library calls a field that was written, and the place in a state where it begins, zero without it."""
-AS_TENSOR = [0, 1, 2, 3, 5, 4]
-"""Places of 11, 22, 33, 12, 13, 23 in a tensor, which ANSYS writes as X, Y, Z, XY, YZ, XZ."""
 NOT_CONVERGED = 999999
 """The substep under which ANSYS writes the state in which it gave up."""
 
@@ -73,7 +71,7 @@ class AnsysResults(ResultFile):
         return [
             number
             for number, (time, substep) in enumerate(zip(times, substeps, strict=False))
-            if substep != NOT_CONVERGED and time <= self.results.last_time * (1 + 1e-5)
+            if substep != NOT_CONVERGED and self.results.reach(time)
         ]
 
     def field(self, kind: str) -> Values | None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.result_file import ResultFile, Values
+from tissuq.decks.result_file import SAME_TIME, ResultFile, Values
 from tissuq.errors import InputError
 
 __all__ = ["CELL_TYPES", "SECTORS_OF_RING", "CalculiXResults", "Frd", "Table", "read_dat", "read_frd", "tensor_of"]
@@ -277,7 +277,7 @@ def _read_field(
     end = row
     while not lines[end].startswith(b" -3"):
         end += 1
-    if time <= last_time * (1 + 1e-5):
+    if time <= last_time * (1 + SAME_TIME):
         rows = [line for line in lines[row:end] if line.startswith(b" -1")]
         numbers, values = _numbers(rows, min(len(components), 6))
         if not np.array_equal(numbers, nodes):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.result_file import ResultFile, Values
+from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
 
 __all__ = ["FEBioResults", "PlotFile", "read_plot_file"]
@@ -41,8 +41,6 @@ PER_ELEMENT, PER_NODE_OF_ELEMENT = 1, 2
 """Storage of a field of a domain: FMT_ITEM and FMT_MULT."""
 FIRST_VERSION = 0x0030
 """That of FEBio 3."""
-AS_TENSOR = [0, 1, 2, 3, 5, 4]
-"""Places of 11, 22, 33, 12, 13, 23 in a symmetric tensor, which FEBio writes as xx, yy, zz, xy, yz, xz."""
 FIELDS = {
     "U": ("displacement",),
     "RF": ("reaction forces",),
@@ -225,7 +223,7 @@ class FEBioResults(ResultFile):
         section, number, storage = self.content.variables[written_names[0]]
         times, rows = [], []
         for time, data in self.content.states:
-            if time <= self.results.last_time * (1 + 1e-5):
+            if self.results.reach(time):
                 regions = {
                     tag: np.frombuffer(values, "<f4") for tag, values in chunks(_variable(data, section, number))
                 }

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.registry import plugins, variants
 
-__all__ = ["ALL", "TENSOR", "ResultFile", "Results", "Values", "result_files", "unknown_set"]
+__all__ = ["ALL", "AS_TENSOR", "SAME_TIME", "TENSOR", "ResultFile", "Results", "Values", "result_files", "unknown_set"]
 
 FloatArray = NDArray[np.float64]
 
@@ -24,6 +24,11 @@ ALL = "ALL"
 """The set of all nodes, where none is named."""
 TENSOR = ("11", "22", "33", "12", "13", "23")
 """Components of a tensor, in their order."""
+
+AS_TENSOR = [0, 1, 2, 3, 5, 4]
+"""Places of these in a tensor that a program writes as XX, YY, ZZ, XY, YZ, XZ."""
+SAME_TIME = 1e-5
+"""Relative difference of times that are the same."""
 
 MOST_NAMES = 20
 """Sets that a message lists."""
@@ -78,6 +83,10 @@ class Results:
             return None
         _, kind, path = min(candidates, key=lambda candidate: candidate[0])
         return kind(path, self)
+
+    def reach(self, times: Any) -> Any:
+        """Return whether the results are converged at a time, or at each of several in an array."""
+        return times <= self.last_time * (1 + SAME_TIME)
 
     def _with_suffix(self, suffix: str) -> Path | None:
         """Return the file of the job, else one of another name that the run wrote."""

@@ -17,7 +17,7 @@ from typing import ClassVar
 from tissuq.errors import InputError
 from tissuq.registry import find, variants
 
-__all__ = ["LOG", "CalculiXSolver", "CommandSolver", "FEBioSolver", "Outcome", "Solver", "solver_for", "solver_named"]
+__all__ = ["LOG", "CalculiXSolver", "CommandSolver", "FEBioSolver", "Outcome", "Solver", "solver_for"]
 
 LOG = "solver.log"
 """What the solver said, in the folder of its run."""
@@ -189,29 +189,18 @@ class CommandSolver(Solver):
     card_format = ""
 
 
-def solver_named(name: str, command: str = "") -> Solver:
-    """Return the solver of that name, with another command if given.
-
-    Raises
-    ------
-    InputError
-        When there is none, or its command is missing or not understood.
-    """
-    return find(Solver, "solver", name, InputError)(command)
-
-
 def solver_for(deck_format: str, name: str | None, command: str = "") -> Solver:
-    """Return the solver of that name, or, unless given, the one for a format of decks.
+    """Return the solver of that name, or, unless given, the one for a format of decks; with another command if given.
 
     Raises
     ------
     InputError
-        When there is none, or it does not read such decks.
+        When there is none, its command is missing or not understood, or it does not read such decks.
     """
     if name is None:
         fitting = [kind.name for kind in variants(Solver).values() if kind.deck_format == deck_format]
         name = fitting[0] if fitting and not command else CommandSolver.name
-    solver = solver_named(name, command)
+    solver = find(Solver, "solver", name, InputError)(command)
     if solver.deck_format not in ("", deck_format):
         raise InputError(f"the solver '{name}' reads decks of the format {solver.deck_format}, not {deck_format}.")
     return solver

@@ -208,9 +208,9 @@ class Case(ABC):
                 raise InputError(f"case '{self.name}': {field.name} must be a positive number, not {value!r}.")
 
     @property
-    @abstractmethod
     def travel(self) -> float:
-        """How far the moved points go, mm, or the pressure, kPa."""
+        """How far the moved points go, mm, or the pressure, kPa: the size that `travel_name` is, unless overridden."""
+        return float(getattr(self, self.travel_name))
 
     @property
     def travel_column(self) -> str:
@@ -285,10 +285,6 @@ class ClampedBar(Case):
     bar_radius: float = 2.5
     fineness: float = 1.0
 
-    @property
-    def travel(self) -> float:
-        return self.elongation
-
     def mesh(self) -> Mesh:
         smallest_cell, growth = self.bar_radius * BAR_CELL / self.fineness, BAR_GROWTH ** (1 / self.fineness)
         half = self.bar_length / 2
@@ -350,10 +346,6 @@ class Indentation(Case):
                 f"case '{self.name}': the depth ({self.depth:g} mm) must be less than the height ({self.height:g} mm), "
                 f"and the punch radius ({self.punch_radius:g} mm) less than the radius ({self.radius:g} mm)."
             )
-
-    @property
-    def travel(self) -> float:
-        return self.depth
 
     def mesh(self) -> Mesh:
         a, smallest_cell, growth = (

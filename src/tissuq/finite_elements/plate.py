@@ -50,10 +50,6 @@ class PlateWithHole(Case):
                 f"{self.width:g} mm)."
             )
 
-    @property
-    def travel(self) -> float:
-        return self.elongation
-
     def mesh(self) -> Mesh:
         outward, quarter = (ceil(count * self.fineness) for count in CELLS)
         angles = np.linspace(0, np.pi / 2, quarter + quarter % 2 + 1)  # one cell ends in the plate's corner

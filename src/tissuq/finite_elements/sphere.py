@@ -48,10 +48,6 @@ class SphericalIndentation(Case):
                 f"and the tip's radius ({self.tip_radius:g} mm), and that less than the radius ({self.radius:g} mm)."
             )
 
-    @property
-    def travel(self) -> float:
-        return self.depth
-
     def mesh(self) -> Mesh:
         cut = np.sqrt(self.depth * (2 * self.tip_radius - self.depth))
         smallest_cell, growth = cut * CELL / self.fineness, GROWTH ** (1 / self.fineness)

@@ -27,7 +27,16 @@ from tissuq.emulation.runs import FIRST_RUNS, ForwardRun, ForwardRuns, carry_out
 from tissuq.errors import InputError
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.parameters.priors import Prior
-from tissuq.studies.stream import RESULTS, Step, forget_results, open_pool, read_results, run_tasks, silent
+from tissuq.studies.stream import (
+    RESULTS,
+    Step,
+    forget_results,
+    open_pool,
+    read_results,
+    run_tasks,
+    silent,
+    write_whole,
+)  # fmt: skip
 
 __all__ = ["calibrate", "runs_of"]
 
@@ -247,9 +256,7 @@ def _open(folder: Path, model: Forward, problem: Problem) -> None:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"'{folder}' is not a folder of forward runs; choose another one.")
     folder.mkdir(parents=True, exist_ok=True)
-    scratch = file.with_suffix(".new")
-    scratch.write_text(json.dumps(about), encoding="utf-8")
-    scratch.replace(file)
+    write_whole(file, json.dumps(about))
 
 
 def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:

@@ -40,6 +40,8 @@ __all__ = [
     "read_results",
     "run_tasks",
     "silent",
+    "unfinished",
+    "write_whole",
 ]
 
 Arguments = ParamSpec("Arguments")
@@ -309,11 +311,19 @@ def forget_results(path: Path, has_failed: Callable[[dict[str, Any]], bool]) -> 
     return failed
 
 
+def unfinished(file: Path) -> Path:
+    """Return where a file is written before it is whole."""
+    return file.with_name(f"{file.name}.new")
+
+
+def write_whole(file: Path, text: str) -> None:
+    """Write a file whole or not at all, whenever the process is killed."""
+    unfinished(file).write_text(text, encoding="utf-8")
+    unfinished(file).replace(file)
+
+
 def _write_results(path: Path, results: Sequence[dict[str, Any]]) -> None:
-    """Write a file of results, whole or not at all."""
-    scratch = path.with_suffix(".new")
-    scratch.write_text("".join(json.dumps(result) + "\n" for result in results), encoding="utf-8")
-    scratch.replace(path)
+    write_whole(path, "".join(json.dumps(result) + "\n" for result in results))
 
 
 def _parsed(line: bytes) -> dict[str, Any] | None:
