@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -89,9 +89,7 @@ def calibrated(
             held_out = (*held_out, calibration.emulator.check(*new_runs.good))
         emulator = _emulator(calibration.runs.joined(new_runs), problem, settings)
         calibration = _posterior(problem, emulator, settings)
-    return Calibration(
-        calibration.problem, calibration.emulator, calibration.posterior, held_out, settings.seed, settings.method
-    )
+    return replace(calibration, held_out=held_out)
 
 
 def _emulator(runs: ForwardRuns, problem: Problem, settings: EmulationSettings) -> Emulator:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import jax
@@ -152,66 +152,61 @@ def log_density(form: Form, values: Any, data: Mapping[str, Any]) -> Any:
     return -0.5 * score @ score - jnp.log(jnp.diag(root)).sum() - 0.5 * len(score) * jnp.log(2 * jnp.pi)
 
 
-@lru_cache
-def _density(form: Form) -> Any:
-    return jax.jit(jax.vmap(lambda values, data: (log_density(form, values, data),), (0, None)))
+def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what compiles a function of a form, values and data for a form: over many values, once for each form."""
+
+    @lru_cache
+    def of_form(form: Form, *choices: Any) -> Any:
+        return jax.jit(jax.vmap(partial(function, form, *choices), (0, None)))
+
+    return of_form
 
 
-@lru_cache
-def _misfit(form: Form) -> Any:
-    def misfit(values: Any, data: Any) -> tuple[Any]:
-        mean, error, discrepancy, noise = _moments(form, values, data)
-        score = solve_triangular(_root(error, discrepancy, noise), data["measured"] - mean, lower=True)
-        return (score @ score,)
-
-    return jax.jit(jax.vmap(misfit, (0, None)))
+@_compiled
+def _density(form: Form, values: Any, data: Any) -> tuple[Any]:
+    return (log_density(form, values, data),)
 
 
-@lru_cache
-def _conditional(form: Form, discrepancy: bool) -> Any:
-    def moments(values: Any, data: Any) -> tuple[Any, Any]:
-        mean, error, process, noise = _moments(form, values, data)
-        root = _root(error, process, noise)
-        predicted = error + process if discrepancy else error
-        shift = predicted @ cho_solve((root, True), data["measured"] - mean)
-        explained = solve_triangular(root, predicted, lower=True)
-        return mean + shift, jnp.maximum(jnp.diag(predicted) - (explained**2).sum(axis=0), 0.0)
-
-    return jax.jit(jax.vmap(moments, (0, None)))
+@_compiled
+def _misfit(form: Form, values: Any, data: Any) -> tuple[Any]:
+    mean, error, discrepancy, noise = _moments(form, values, data)
+    score = solve_triangular(_root(error, discrepancy, noise), data["measured"] - mean, lower=True)
+    return (score @ score,)
 
 
-@lru_cache
-def _noise(form: Form) -> Any:
-    def variance(values: Any, data: Any) -> tuple[Any]:
-        return (_noise_variance(form, dict(zip(form.symbols, values, strict=True)), data),)
-
-    return jax.jit(jax.vmap(variance, (0, None)))
-
-
-@lru_cache
-def _replicate(form: Form) -> Any:
-    def replicate(row: Any, data: Any) -> tuple[Any]:
-        values, scores = jnp.split(row, [len(form.symbols)])
-        mean, error, discrepancy, noise = _moments(form, values, data)
-        root = _root(error, discrepancy, noise)
-        shift = (error + discrepancy) @ cho_solve((root, True), data["measured"] - mean)
-        half = solve_triangular(root, jnp.eye(len(scores)), lower=True)
-        # A - A K^-1 A + N with K = A + N, but never singular
-        spread = jnp.linalg.cholesky(2 * jnp.diag(noise) - noise[:, None] * (half.T @ half) * noise)
-        return (mean + shift + spread @ scores,)
-
-    return jax.jit(jax.vmap(replicate, (0, None)))
+@_compiled
+def _conditional(form: Form, discrepancy: bool, values: Any, data: Any) -> tuple[Any, Any]:
+    mean, error, process, noise = _moments(form, values, data)
+    root = _root(error, process, noise)
+    predicted = error + process if discrepancy else error
+    shift = predicted @ cho_solve((root, True), data["measured"] - mean)
+    explained = solve_triangular(root, predicted, lower=True)
+    return mean + shift, jnp.maximum(jnp.diag(predicted) - (explained**2).sum(axis=0), 0.0)
 
 
-@lru_cache
-def _ratio(form: Form) -> Any:
-    def largest(values: Any, data: Any) -> tuple[Any]:
-        _, error, discrepancy, noise = _moments(form, values, data)
-        root = _root(0.0 * error, discrepancy, noise)
-        half = solve_triangular(root, error, lower=True)
-        return (jnp.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[-1],)
+@_compiled
+def _noise(form: Form, values: Any, data: Any) -> tuple[Any]:
+    return (_noise_variance(form, dict(zip(form.symbols, values, strict=True)), data),)
 
-    return jax.jit(jax.vmap(largest, (0, None)))
+
+@_compiled
+def _replicate(form: Form, row: Any, data: Any) -> tuple[Any]:
+    values, scores = jnp.split(row, [len(form.symbols)])
+    mean, error, discrepancy, noise = _moments(form, values, data)
+    root = _root(error, discrepancy, noise)
+    shift = (error + discrepancy) @ cho_solve((root, True), data["measured"] - mean)
+    half = solve_triangular(root, jnp.eye(len(scores)), lower=True)
+    # A - A K^-1 A + N with K = A + N, but never singular
+    spread = jnp.linalg.cholesky(2 * jnp.diag(noise) - noise[:, None] * (half.T @ half) * noise)
+    return (mean + shift + spread @ scores,)
+
+
+@_compiled
+def _ratio(form: Form, values: Any, data: Any) -> tuple[Any]:
+    _, error, discrepancy, noise = _moments(form, values, data)
+    root = _root(0.0 * error, discrepancy, noise)
+    half = solve_triangular(root, error, lower=True)
+    return (jnp.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[-1],)
 
 
 @lru_cache
