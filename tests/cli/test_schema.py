@@ -5,8 +5,8 @@ import json
 import jsonschema
 import pytest
 
+from tissuq.cli.catalogue import schema_of
 from tissuq.cli.command import CONFIGURED
-from tissuq.cli.schema import schema_of
 
 
 def test_the_schema_names_types_defaults_units_and_options(cli):

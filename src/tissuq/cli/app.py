@@ -18,12 +18,10 @@ from tissuq.cli import (
     export,
     fit,
     inspect,
-    local_app,
     paper,
     population,
     predict,
     project,
-    schema,
     show,
     structure,
     study,
@@ -79,7 +77,7 @@ def _tissuq(
 
 COMMANDS: dict[str, dict[str, Any]] = {
     "Start here": {
-        "init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show, "app": local_app.app,
+        "init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show, "app": project.app,
     },
     "After a fit": {
         "predict": predict.predict, "compare": compare.compare, "design": design.design, "export": export.export,
@@ -89,7 +87,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
     "How far to trust it": {"paper": paper.paper, "check": catalogue.check},
     "What there is": {
         "materials": catalogue.materials, "modes": catalogue.modes, "discrepancies": catalogue.discrepancies,
-        "datasets": catalogue.datasets, "doctor": project.doctor, "schema": schema.schema,
+        "datasets": catalogue.datasets, "doctor": project.doctor, "schema": catalogue.schema,
     },
 }  # fmt: skip
 """The commands, under the headings of the help."""

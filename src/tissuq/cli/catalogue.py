@@ -1,21 +1,26 @@
-"""``tissuq materials``, ``modes``, ``discrepancies``, ``datasets``: what is available; ``check``: your own law."""
+"""``tissuq materials``, ``modes``, ``discrepancies``, ``datasets``, ``schema``: what there is; ``check``: your law."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tissuq.cli.call import Call
+from tissuq.cli.command import CONFIGURED, command, settings_of
+from tissuq.cli.running import Running
 from tissuq.errors import InputError
+from tissuq.studies.option import Settings, argument, slots_of
 
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.model.discrepancy import Discrepancy
 
-__all__ = ["check", "datasets", "discrepancies", "materials", "modes"]
+__all__ = ["check", "datasets", "discrepancies", "materials", "modes", "schema", "schema_of"]
 
 LONG = 70
 """Characters of a formula from which its source stands on a line of its own."""
@@ -108,3 +113,33 @@ def check(material: Annotated[str, typer.Argument(help="Your own law.py:Name, or
     print(f"    parameters: {', '.join(f'{p.symbol} ({p.unit})' if p.unit else p.symbol for p in law.parameters)}")
     for result in checked(law):
         print(f"    FAILS: {result.claim}: {result.problem}" if result.problem else f"    holds: {result.claim}")
+
+
+class SchemaOf(Settings):
+    """Whose schema."""
+
+    command: str = argument(..., "A command that takes --config, such as fit.")
+
+
+@command(SchemaOf, Running)
+def schema(call: Call[SchemaOf, Running]) -> None:
+    """Print the JSON schema of what --config of a command takes: settings, types, units, defaults."""
+    print(json.dumps(schema_of(call.settings.command), indent=2))
+
+
+def schema_of(name: str) -> dict[str, Any]:
+    """Return the JSON schema of the settings of a command, with the option of each.
+
+    Raises
+    ------
+    InputError
+        When no such command has settings.
+    """
+    kind = settings_of(name)
+    if kind is None:
+        raise InputError(f"no command '{name}' takes --config; choose one of {', '.join(sorted(CONFIGURED))}.")
+    json_schema = kind.model_json_schema()
+    for slot in slots_of(kind):
+        if len(slot.path) == 1:
+            json_schema["properties"][slot.path[0]]["option"] = slot.typed
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **json_schema}

@@ -1,4 +1,4 @@
-"""``tissuq init`` and ``doctor``: an example to begin from, and what is here to work with."""
+"""``tissuq init``, ``doctor`` and ``app``: an example to begin from, what is here to work with, and the local page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tissuq.errors import InputError
 if TYPE_CHECKING:
     from tissuq.studies.installation import Extra, Package, Program
 
-__all__ = ["doctor", "init"]
+__all__ = ["app", "doctor", "init"]
 
 
 def init(
@@ -67,3 +67,17 @@ def _print_extra(extra: Extra) -> None:
 
 def _print_program(program: Program) -> None:
     print(f"    {program.name:<10} {program.purpose}\n               {program.path or 'not on the PATH'}")
+
+
+def app(
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the page on this computer; 0 takes a free one.")
+    ] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+) -> None:
+    """Open a page in the browser for files of measurements: read, mend, fit, compare, predict, export."""
+    try:
+        from tissuq.app.server import serve
+    except ModuleNotFoundError as missing:
+        raise InputError(f"the page needs {missing.name}: pip install 'tissuq[app]'.") from missing
+    serve(port, open_browser=browser)

@@ -1,8 +1,7 @@
 """Finite elements with the draws of a posterior: materials for FElupe, cases, and the uncertainty of what they give."""
 
-from tissuq.finite_elements.body_from_file import BodyFromFile
+from tissuq.finite_elements.body_from_file import BodyFromFile, InflatedBody
 from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, RigidTip, Supports, cases
-from tissuq.finite_elements.inflated import InflatedBody
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.finite_elements.plate import PlateWithHole
 from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond

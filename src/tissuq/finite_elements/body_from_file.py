@@ -1,4 +1,4 @@
-"""Bodies of the user's own: a mesh in a file, by whose sets of points it is held and moved."""
+"""Bodies of the user's own: a mesh in a file, by whose sets of points it is held, and moved, pressed or inflated."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import AXIAL, Case, FloatArray, Mesh, RigidTip, Supports
+from tissuq.finite_elements.case import AXIAL, Case, FloatArray, Inflation, Mesh, RigidTip, Supports
 from tissuq.finite_elements.library import region_of
 from tissuq.finite_elements.mesh_file import AXES, NEARLY, MeshFile, deck_text, read_mesh
 
-__all__ = ["BodyFromFile"]
+__all__ = ["BodyFromFile", "InflatedBody"]
 
 Shape = Literal["axisymmetric", "plane", "solid"]
 
@@ -35,6 +35,8 @@ ORIENTATIONS = {
 """Points that lie along the axes of a cell from its first one, and the order of its points in its mirror image."""
 WITHOUT_CONTACT = ("quad8", "hexahedron20")
 """Cells whose corners a constant pressure pulls outwards, so that points cannot be held by contact one by one."""
+WITHOUT_PRESSURE = ("triangle6", "tetra10")
+"""Cells whose faces FElupe has no pressure for."""
 MESHES = 2
 """That are remembered: a mesh, and a finer one."""
 
@@ -287,3 +289,73 @@ def _rigid_motions(points: FloatArray, shape: str) -> FloatArray:
             turn[:, from_axis], turn[:, to_axis] = -centred[:, to_axis], centred[:, from_axis]
             turns.append(turn)
     return np.stack([*shifts, *turns])
+
+
+@dataclass(frozen=True)
+class InflatedBody(BodyFromFile):
+    """A body whose mesh is in a file, a part of its surface under pressure; it answers with a displacement.
+
+    Parameters are those of `BodyFromFile`, but for these.
+
+    Parameters
+    ----------
+    press : str
+        The set of points whose faces are under pressure.
+    distance : float
+        The pressure, kPa.
+    watch : str
+        The set of points whose mean displacement, mm, is the answer.
+    direction : str
+        Its direction, ``"x"``, ``"y"`` or ``"z"``.
+
+    Raises
+    ------
+    InputError
+        As `BodyFromFile`, and for cells of triangles or tetrahedra.
+    """
+
+    name: ClassVar[str] = "inflated"
+    description: ClassVar[str] = "a body whose mesh is in a file, under pressure"
+    travel_name: ClassVar[str] = "pressure"
+    travel_unit: ClassVar[str] = "kPa"
+    response: ClassVar[str] = "displacement"
+    response_unit: ClassVar[str] = "mm"
+
+    watch: str = ""
+    direction: str = "x"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        mesh, _ = self._mesh_and_sets()
+        if mesh.kind.meshio in WITHOUT_PRESSURE:
+            raise InputError(f"a pressure cannot act on {mesh.kind.plural}; use quadrilaterals or hexahedra.")
+        self._check_faces(mesh)
+
+    def _check_faces(self, mesh: Mesh) -> None:
+        """Refuse a set that has every face of the surface: a pressure all around only squeezes."""
+        region = region_of(mesh, "Boundary", ensure_3d=not mesh.is_solid)
+        if len(np.setdiff1d(region.mesh.cells_faces, self._found().sets[self.press])):
+            return
+        raise InputError(
+            f"the set '{self.press}' holds all points of the surface of '{self.file}', so that the pressure would act "
+            "all around the body: give --inflate the set of the points of the pressed faces alone, as a physical group "
+            f"of Gmsh or an *NSET; the sets are {', '.join(sorted(self._found().sets))}."
+        )
+
+    def _check_pressed(self) -> None:
+        axes = AXES[: self._found().points.shape[1]]
+        if not self.direction or self.direction not in axes:
+            raise InputError(
+                f"the displacement of the set '{self.watch}' is along {', '.join(axes)}, not '{self.direction}'."
+            )
+
+    @property
+    def _named(self) -> tuple[str, ...]:
+        return (self.press, self.watch)
+
+    def supports(self, points: FloatArray) -> Supports:
+        fixed, sets = self._held(points), self._mesh_and_sets()[1]
+        pressed, watched = np.zeros((2, len(points)), dtype=bool)
+        pressed[sets[self.press]] = watched[sets[self.watch]] = True
+        load = Inflation(pressed, watched, self._columns.index(AXES.index(self.direction)))
+        return Supports(fixed, np.zeros(len(points), dtype=bool), float(np.sign(self.distance)), self.parts, load)

@@ -170,8 +170,7 @@ class SimulationSettings(RunSettings):
         return None if self.finer_mesh is None else self._body(beside / self.finer_mesh)
 
     def _body(self, file: Path) -> Case:
-        from tissuq.finite_elements.body_from_file import BodyFromFile
-        from tissuq.finite_elements.inflated import InflatedBody
+        from tissuq.finite_elements.body_from_file import BodyFromFile, InflatedBody
 
         loads = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
         if len(loads) != 1 or self.sizes or self.case or bool(self.watch) != bool(self.inflate):
