@@ -12,8 +12,8 @@ import tissuq as tq
 from marks import slow_but
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.stress import path_energy
-from tissuq.posterior import ensemble
-from tissuq.posterior.ensemble import drawn_ensemble
+from tissuq.posterior import drawn_materials
+from tissuq.posterior.drawn_materials import drawn_ensemble
 
 STRETCH = np.linspace(0.7, 1.8, 24)
 TRUTH = {"C10": 0.5, "C20": 0.06, "C30": 0.01}
@@ -210,14 +210,14 @@ def test_draws_of_fibres_are_their_law_and_give_its_stresses():
 
 def test_a_matrix_that_is_unstable_is_left_out_with_its_fibres(monkeypatch):
     posterior = sheet("rivlin:C10,C20+standard-fibres@40", discrepancy="none")
-    usual = ensemble._materials
+    usual = drawn_materials._materials
 
     def materials(*arguments):
         first, *others = usual(*arguments)
         ((material, values),) = first.parts
         return [replace(first, parts=((material, (-values[0], *values[1:])),)), *others]
 
-    monkeypatch.setattr(ensemble, "_materials", materials)
+    monkeypatch.setattr(drawn_materials, "_materials", materials)
     draws = posterior.ensemble(4)
     assert draws.tried == 6  # two batches, whose first is left out
     assert all(draw.values["C10"] > 0 for draw in draws)

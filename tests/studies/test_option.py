@@ -22,7 +22,7 @@ class Throw(Settings):
     numbers: tuple[int, ...] = option((), "Which.")
     is_far: bool = option(False, "Far.")
     kind: Literal["high", "low"] | None = option(None, "high or low.")
-    way: str = option("sobol", "A way.", choices="tissuq.posterior.ensemble:Sampling")
+    way: str = option("sobol", "A way.", choices="tissuq.posterior.drawn_materials:Sampling")
     inner: int = 3
 
 

@@ -12,7 +12,7 @@ from tissuq.studies.option import option
 from tissuq.studies.shared_options import RunSettings, sampling
 
 if TYPE_CHECKING:
-    from tissuq.posterior.ensemble import Sampling
+    from tissuq.posterior.drawn_materials import Sampling
 
 __all__ = ["export"]
 

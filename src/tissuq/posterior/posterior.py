@@ -31,7 +31,8 @@ from tissuq.next_test import Candidate, rank_tests
 from tissuq.next_test.candidates import Target
 from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
-from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
+from tissuq.posterior.drawn_materials import Sampling, drawn_ensemble
+from tissuq.posterior.ensemble import Ensemble
 from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries, summaries_in
 from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.posterior.plots import PosteriorPlots

@@ -42,7 +42,9 @@ def seed() -> Any:
 
 def sampling() -> Any:
     """Declare how draws spread through a posterior."""
-    return option("sobol", "How draws spread: sobol, latin or random.", choices="tissuq.posterior.ensemble:Sampling")
+    return option(
+        "sobol", "How draws spread: sobol, latin or random.", choices="tissuq.posterior.drawn_materials:Sampling"
+    )
 
 
 def mesh_order(group: str) -> Any:
