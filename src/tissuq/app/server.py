@@ -6,7 +6,7 @@ import signal
 import socket
 import tempfile
 import webbrowser
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from secrets import token_urlsafe
@@ -42,17 +42,7 @@ class _Server(uvicorn.Server):
                 signal.signal(number, handler)
 
 
-def _say(text: str) -> None:
-    print(text, flush=True)
-
-
-def serve(
-    port: int = 0,
-    *,
-    open_browser: bool = True,
-    grace: float = GRACE,
-    say: Callable[[str], None] = _say,
-) -> None:
+def serve(port: int = 0, *, open_browser: bool = True, grace: float = GRACE) -> None:
     """Serve the page until Ctrl-C.
 
     Parameters
@@ -62,8 +52,6 @@ def serve(
     open_browser : bool
     grace : float
         Seconds after which the files of a page that was closed are deleted.
-    say : callable
-        Is told the address.
 
     Raises
     ------
@@ -79,7 +67,8 @@ def serve(
         @asynccontextmanager
         async def lifespan(_: Starlette) -> AsyncIterator[None]:
             await sessions.workers.start()
-            say(f"The page is at {address}\nIt is for this computer alone. Ctrl-C ends it and deletes its files.")
+            said = f"The page is at {address}\nIt is for this computer alone. Ctrl-C ends it and deletes its files."
+            print(said, flush=True)
             if open_browser:
                 webbrowser.open(address)
             try:
