@@ -11,7 +11,7 @@ from tissuq.export.constrained_fit import Inequalities, fit_within, least_square
 from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.stability_rows import StabilityRows
 
-__all__ = ["WANTED_ERROR", "Candidate", "NearestLaw", "squared_distance"]
+__all__ = ["WANTED_ERROR", "Candidate", "nearest_values", "squared_distance"]
 
 FloatArray = NDArray[np.float64]
 
@@ -40,8 +40,10 @@ class Candidate(NamedTuple):
     unit_moduli: FloatArray
 
 
-class NearestLaw:
-    """The linear parameters nearest to a draw that have its initial shear modulus, and are stable where it is.
+def nearest_values(candidate: Candidate, stability: StabilityRows, draws: DrawStresses, number: int) -> FloatArray:
+    """Return the linear parameters (k,) nearest to a draw that have its initial shear modulus.
+
+    They are stable where the draw is. Of what was not measured the heaviest weight is taken that costs little inside.
 
     Parameters
     ----------
@@ -52,40 +54,33 @@ class NearestLaw:
     number : int
         Of the draw.
     """
+    starts, free = _of_modulus(candidate.unit_moduli, draws.modulus[[number]])
+    start = starts[:, 0]
+    modulus, is_stable = float(draws.modulus[number]), bool(draws.stable[number])
+    stress = draws.of_states.stress[number]
+    is_borne = np.isfinite(stress)
+    is_beyond, size = draws.shell[is_borne] > 0, draws.size_in_fits[number, is_borne]
+    columns, stress = candidate.columns[is_borne] / size[:, None], stress[is_borne] / size
 
-    def __init__(self, candidate: Candidate, stability: StabilityRows, draws: DrawStresses, number: int) -> None:
-        start, self.free = _of_modulus(candidate.unit_moduli, draws.modulus[[number]])
-        self.start, self.stability = start[:, 0], stability
-        self.wanted_stiffness = draws.wanted_stiffness[number]
-        self.modulus, self.is_stable = float(draws.modulus[number]), bool(draws.stable[number])
-        stress = draws.of_states.stress[number]
-        is_borne = np.isfinite(stress)
-        self.is_beyond, size = draws.shell[is_borne] > 0, draws.size_in_fits[number, is_borne]
-        self.columns, self.stress = candidate.columns[is_borne] / size[:, None], stress[is_borne] / size
+    def broken(solution: FloatArray) -> Inequalities:
+        rows, bounds = stability.broken(start + free @ solution, modulus, draws.wanted_stiffness[number])
+        return rows @ free, bounds - rows @ start
 
-    def values(self) -> FloatArray:
-        """Return the parameters (k,) with the heaviest weight of what was not measured that costs little inside."""
-        candidates = [self._weighted(weight) for weight in WEIGHTS_BEYOND]
-        errors = [np.abs(self.columns @ values - self.stress)[~self.is_beyond] for values in candidates]
-        rms = [float(np.sqrt((error**2).mean())) for error in errors]
-        is_good = [
-            error.max() <= WANTED_ERROR or size <= MAX_RMS_RATIO * min(rms)
-            for error, size in zip(errors, rms, strict=True)
-        ]
-        return candidates[is_good.index(True)]
-
-    def _weighted(self, weight_beyond: float) -> FloatArray:
-        weights = np.where(self.is_beyond, weight_beyond, 1.0)
-        columns = weights[:, None] * (self.columns @ self.free)
-        wanted = weights * (self.stress - self.columns @ self.start)
-        solution = fit_within(columns, wanted, self._broken) if self.is_stable else None
+    def weighted(weight_beyond: float) -> FloatArray:
+        weights = np.where(is_beyond, weight_beyond, 1.0)
+        weighted_columns, wanted = weights[:, None] * (columns @ free), weights * (stress - columns @ start)
+        solution = fit_within(weighted_columns, wanted, broken) if is_stable else None
         if solution is None:  # as near as it gets: that it is not stable is said
-            solution = least_squares(columns, wanted)
-        return np.asarray(self.start + self.free @ solution)
+            solution = least_squares(weighted_columns, wanted)
+        return np.asarray(start + free @ solution)
 
-    def _broken(self, solution: FloatArray) -> Inequalities:
-        rows, bounds = self.stability.broken(self.start + self.free @ solution, self.modulus, self.wanted_stiffness)
-        return rows @ self.free, bounds - rows @ self.start
+    candidates = [weighted(weight) for weight in WEIGHTS_BEYOND]
+    errors = [np.abs(columns @ values - stress)[~is_beyond] for values in candidates]
+    rms = [float(np.sqrt((error**2).mean())) for error in errors]
+    is_good = [
+        error.max() <= WANTED_ERROR or size <= MAX_RMS_RATIO * min(rms) for error, size in zip(errors, rms, strict=True)
+    ]
+    return candidates[is_good.index(True)]
 
 
 def _of_modulus(unit_moduli: FloatArray, modulus: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -15,7 +15,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import SimpleShear
 from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.laws import Law
-from tissuq.export.nearest_law import Candidate, NearestLaw, squared_distance
+from tissuq.export.nearest_law import Candidate, nearest_values, squared_distance
 from tissuq.export.stability_rows import StabilityRows
 from tissuq.export.states import SHEARS, PrincipalStates, initial_slope
 from tissuq.mechanics import Material, stress_basis
@@ -96,8 +96,7 @@ class Projection(ABC):
 
         best = min(self.candidates(draws.states), key=loss)
         rows = StabilityRows.of(self.material, best.setting, draws.stability_states, draws.largest_invariants)
-        fits = (NearestLaw(best, rows, draws, number) for number in range(len(draws.ensemble)))
-        values = np.array([fit.values() for fit in fits])
+        values = np.array([nearest_values(best, rows, draws, number) for number in range(len(draws.ensemble))])
         return Law(self.material, np.hstack([values, np.tile(best.setting, (len(values), 1))]))
 
 
