@@ -189,7 +189,6 @@ class Tolerances:
 
     @property
     def _standard(self) -> Mapping[str, float]:
-        """The sizes of the estimand."""
         return ESTIMANDS[self.estimand].sizes if self.estimand else {}
 
     def meaning(self, experiment: Experiment) -> str:
@@ -283,9 +282,8 @@ class Tolerances:
     def has_standard_spreads(self) -> bool:
         """Whether the spreads between specimens and tests are those of the estimand, not stated by themselves."""
         standard, names = self._standard, (ScaleError.name, TestError.name)
-        is_stated = bool(self._numbers & {*names})
         is_standard = all(self._sizes.get(name, 0.0) == standard.get(name, 0.0) for name in names)
-        return bool(standard) and is_standard and not is_stated
+        return bool(standard) and is_standard and not self._numbers & {*names}
 
     def in_common(self, experiment: Experiment) -> float:
         """Return the standard deviation of the relative error of stress that all specimens and tests have in common."""
