@@ -206,7 +206,7 @@ def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the
     assert not list(tmp_path.glob("run*"))
     said = run_in(tmp_path, *usual, *material, "--unit", "kPa")
     assert said.status == 0, said.err
-    assert "kPa, 95 % HPD" in said.out
+    assert "kPa, 95 % interval" in said.out
 
 
 def test_of_columns_of_one_name_the_number_is_asked_for(cli, here):
