@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.stats import halfcauchy
@@ -13,6 +15,7 @@ from tissuq.inference.linear import times_gaussians
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points
 from tissuq.model.noise import stress_level
 
+SKIN = Path(__file__).parents[3] / "shared" / "data" / "tissues" / "skin-porcine-p12ac1.csv"
 STRETCH = np.linspace(0.7, 1.9, 14)
 UNIT = 2 * (STRETCH - STRETCH**-2)
 ZERO_MODULUS = 2 * (1 - STRETCH**-3) - UNIT
@@ -170,6 +173,17 @@ def test_the_end_of_a_long_ridge_is_found(x_0, sd, width, count, min_effective):
     adaptation = adapted(log_density, 2, count, min_effective=min_effective)
     assert np.exp(adaptation.log_weights).mean() == pytest.approx(1, rel=0.1)
     assert len(adaptation.points) == len(adaptation.log_weights)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SKIN.is_file(), reason="the tests of skin are not among the shared data here")
+def test_dispersed_fibres_are_found_in_five_tests_of_skin():
+    """Which the rounds of one search did not reach; the angle is that of the stiffer axis, the second one."""
+    solution = tq.fit(tq.read_tests(SKIN), material="gasser-ogden-holzapfel").solution
+    assert solution.log_evidence_error < 0.5
+    low, high = solution.marginals["phi"].hdi()
+    assert np.pi / 4 < low < high < np.pi / 2
+    assert solution.marginals["kappa"].hdi()[1] < 0.15
 
 
 def test_the_proposal_is_a_normalised_density():
