@@ -146,6 +146,15 @@ def test_specimens_of_a_table_are_listed_and_one_of_them_is_read(cli, here):
     assert cli("inspect", "all.csv", "--only", "Specimen").status == 2
 
 
+def test_what_was_seen_in_several_tests_is_one_note(cli, here):
+    rows = [f"{name},{1 + k / 100},{max(k - slack, 0)}" for name, slack in (("a", 6), ("b", 8)) for k in range(40)]
+    (here / "slack.csv").write_text("\n".join(["Specimen,stretch,stress [kPa]", *rows]) + "\n")
+    said = " ".join(cli("inspect", "slack.csv").out.split())
+    assert said.count("carry no load that shows") == 1
+    assert "Note all tests: the first " in said
+    assert "(The numbers are those of the first.)" in said
+
+
 def test_positions_and_a_rupture_are_read_by_options(cli, here):
     force = [*(0.1 * k for k in range(20)), *[0.01] * 5]
     rows = [f"{30 + 0.2 * k},{load}" for k, load in enumerate(force)]

@@ -223,8 +223,8 @@ def _stress_at_rest(reading: Reading, number: int) -> str:
     if slack := _slack_without(reading, number, at_rest):
         options += " --preload auto"
         beside = (
-            f", and slack: without it the first {slack.rows} rows carry no load that shows, up to {control.name} "
-            f"{slack.stretch:.4g}"
+            f", and slack: without it the first {slack.rows} rows carry no load that shows, until the {control.name} "
+            f"is {slack.stretch:.4g}"
         )
     return (
         f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "

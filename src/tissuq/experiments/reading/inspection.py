@@ -11,12 +11,13 @@ import numpy as np
 
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading, read_file
-from tissuq.experiments.reading.findings import concerned, data_warnings
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.vocabulary import SPREADS
 from tissuq.experiments.units import stress_unit
+from tissuq.result_warning import merged
 
 __all__ = ["Inspection", "inspect", "lines_of_tests", "noise_between_neighbours", "overview"]
 
@@ -190,12 +191,11 @@ def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:
 
 
 def overview(inspections: Sequence[Inspection]) -> str:
-    """Return what was understood of several tests: a line and the warnings of each."""
-    pairs = [(str(number), text) for number, test in enumerate(inspections, start=1) for text in test.warnings]
+    """Return what was understood of several tests: a line of each, and the warnings of all."""
+    of_tests = {f"test {number}": data_warnings(test.reading) for number, test in enumerate(inspections, start=1)}
     lines = [f"{len(inspections)} tests were understood", "", *lines_of_tests(inspections)]
-    for text, numbers in concerned(pairs).items():
-        of_tests = "all tests" if len(numbers) == len(inspections) else f"test {', '.join(numbers)}"
-        lines += ["", _wrapped("Note", f"{of_tests}: {text}")]
+    for text in merged(of_tests, named=True, everyone="all tests"):
+        lines += ["", _wrapped("Note", text)]
     return "\n".join([*lines, "", "To see one of them: tissuq inspect 'FILE#NAME', with its name or number."])
 
 

@@ -330,8 +330,8 @@ def _slack(tested: TestedStress) -> Iterator[Region]:
     yield Region(
         "slack",
         tested.branches[0][: slack.rows],
-        f"the first {slack.rows} rows carry no load that shows, up to {tested.mode.controls[0].name} "
-        f"{slack.stretch:.4g} (standard deviation {slack.sd:.2g}): slack, or a toe too soft to measure; {advice}",
+        f"the first {slack.rows} rows carry no load that shows, until the {tested.mode.controls[0].name} "
+        f"is {slack.stretch:.4g} (standard deviation {slack.sd:.2g}): slack, or a toe too soft to measure; {advice}",
     )
 
 
