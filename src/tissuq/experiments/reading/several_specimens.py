@@ -109,7 +109,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
         )
         raise SeveralSpecimens(
             f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
-            f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}})"
+            f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}}; tissuq.read_tests reads all)"
             f"{fit_all if len(distinct) >= SPECIMENS_OF_POPULATION else ''}.",
             name,
             labels,
