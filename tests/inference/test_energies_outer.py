@@ -157,7 +157,13 @@ def test_a_narrow_and_skewed_density_is_found():
 
 @pytest.mark.parametrize(
     ("x_0", "sd", "width", "count", "min_effective"),
-    [(-2.2, 0.05, 0.01, 96, 20.0), (-2.0, 0.05, 0.005, 64, 20.0), (2.2, 0.05, 0.01, 96, 6.0)],
+    [
+        (-2.2, 0.05, 0.01, 96, 20.0),
+        (-2.0, 0.05, 0.005, 64, 20.0),
+        (2.2, 0.05, 0.01, 96, 6.0),
+        (-2.6, 0.05, 0.005, 96, 6.0),
+        (-2.4, 0.1, 0.02, 96, 6.0),
+    ],
 )
 def test_the_end_of_a_long_ridge_is_found(x_0, sd, width, count, min_effective):
     """Of a normalised density at the end of a ridge, on which many points are effective among those that lie lower.

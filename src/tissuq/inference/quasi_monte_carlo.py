@@ -134,6 +134,11 @@ class Adaptation(NamedTuple):
     points: FloatArray
     log_weights: FloatArray
 
+    @property
+    def log_mass(self) -> float:
+        """The logarithm of the integral of the density."""
+        return float(np.logaddexp.reduce(self.log_weights)) - log(len(self.points))
+
 
 def adapted(
     log_density: Callable[[FloatArray], FloatArray],
@@ -155,12 +160,12 @@ def adapted(
     """
     count = count or 16 + 16 * dimension
     uniforms = even_points(dimension, count * MAX_ROUNDS)
-    proposal = start or Proposal(np.zeros(dimension), np.eye(dimension))
+    proposal, log_mass = start or Proposal(np.zeros(dimension), np.eye(dimension)), None
     for _ in range(MAX_SEARCHES):
-        adaptation, is_near = _search(log_density, uniforms, proposal, min_effective)
+        adaptation, is_near = _search(log_density, uniforms, proposal, min_effective, log_mass)
         if is_near:
             break
-        proposal = adaptation.proposal
+        proposal, log_mass = adaptation.proposal, adaptation.log_mass
     return adaptation
 
 
@@ -169,16 +174,18 @@ def _search(
     uniforms: FloatArray,
     start: Proposal,
     min_effective: float | None,
+    log_mass: float | None,
 ) -> tuple[Adaptation, bool]:
     """Return what the rounds of one search lead to, and whether enough of their points are effective.
 
     On the way along a ridge many points may be effective among those that lie lower, and the mass still grows: it is to
-    have settled from one round to the next, unless the first proposal was good enough.
+    have settled from one round to the next, from the search before to the first, unless the very first proposal was
+    good enough.
     """
     dimension, count = uniforms.shape[1], len(uniforms) // MAX_ROUNDS
     least_effective = 4.0 + 4 * dimension
     proposal, proposals = start, list[Proposal]()
-    points, values, log_mass = np.zeros((0, dimension)), np.zeros(0), -np.inf
+    points, values = np.zeros((0, dimension)), np.zeros(0)
     for round_ in range(MAX_ROUNDS):
         new = proposal.points(uniforms[round_::MAX_ROUNDS])
         proposals.append(proposal)
@@ -197,10 +204,11 @@ def _search(
         is_found = of_round > MIN_EFFECTIVE_SHARE * count
         if min_effective is not None:
             is_found = effective(log_weights) > min_effective
-        log_mass, earlier_log_mass = float(np.logaddexp.reduce(log_weights)) - log(len(points)), log_mass
-        if is_found and (round_ == 0 or abs(log_mass - earlier_log_mass) < MAX_CHANGE):
-            return Adaptation(proposal, points, log_weights), True
-    return Adaptation(proposal, points, log_weights), False
+        adaptation = Adaptation(proposal, points, log_weights)
+        earlier, log_mass = log_mass, adaptation.log_mass
+        if is_found and (earlier is None or abs(log_mass - earlier) < MAX_CHANGE):
+            return adaptation, True
+    return adaptation, False
 
 
 def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:
