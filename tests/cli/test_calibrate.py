@@ -95,6 +95,7 @@ def test_the_next_step_names_all_options_that_a_law_needs(calibrate_run):
     assert "--material LAW --range LOW:HIGH --force" in " ".join(said.out.split())
 
 
+@pytest.mark.slow
 def test_lines_are_left_out_as_the_message_says(calibrate_run, tmp_path):
     folder, _ = calibrate_run
     write_all(tmp_path)
