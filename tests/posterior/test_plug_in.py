@@ -1,5 +1,7 @@
 """Estimates that are plugged in are visible, and say what they cost."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import tissuq as tq
 from autoregression import autoregressive_errors
 from tissuq.experiments.modes import loading_mode
 from tissuq.model.tolerances import CONTRADICTION_SPREAD
-from tissuq.posterior.plug_in import FACTORS, LAG_GRID
+from tissuq.posterior.plug_in import FACTORS, LAG_GRID, ErrorEstimates
 from tissuq.posterior.solver import Solver
 
 STRETCH = np.linspace(0.8, 1.3, 9)
@@ -74,6 +76,18 @@ def test_consecutive_noise_needs_its_lag():
     errors = posterior.model.fitted_errors
     assert errors.fits == 6
     assert f"the lag-1 correlation of {errors.lag:.3g} estimated by 6 further fits" in posterior.how
+
+
+def test_no_lag_is_taken_from_fits_without_an_evidence():
+    """Such as those of the sampler, to which models with known noise are left where quadrature does not serve."""
+    model = tq.fit(specimens(1)[0], discrepancy="none", noise="autoregressive", tolerances="as-tested").model
+
+    def without_evidence(_):
+        return SimpleNamespace(log_evidence=None)
+
+    estimates = ErrorEstimates(without_evidence, lambda _: True, lambda _: True, lambda: without_evidence)
+    with pytest.raises(tq.ModelError, match="needs the evidence"):
+        estimates.of(model.with_errors(lag=None))
 
 
 @pytest.mark.parametrize("tolerances", ["as-tested", tq.Tolerances("as-tested", length=0.01, slack=0.005)], ids=str)

@@ -158,7 +158,7 @@ class ErrorEstimates:
         self._fits += 1
 
         def log_evidence(log_level: float) -> float:
-            return solve(at_noise(model, float(np.exp(log_level)))).log_evidence or 0.0
+            return _evidence_of(solve(at_noise(model, float(np.exp(log_level)))), model)
 
         reach = float(np.log(MAX_LEVEL_FACTOR))
         log_level, largest = highest(log_evidence, float(np.log(level)), LEVEL_STEP, reach, LEVEL_ACCURACY)
@@ -195,7 +195,9 @@ class ErrorEstimates:
 
         def log_evidence_at(lag: float) -> float:
             lagged = model.with_errors(lag=lag)
-            return self._best_level(lagged, level, solve)[1] if self._sums_noise(model) else self._evidence(lagged)
+            if self._sums_noise(model):
+                return self._best_level(lagged, level, solve)[1]
+            return _evidence_of(self._solution(lagged), lagged)
 
         best, evidences = len(LAG_GRID) // 2, dict[int, float]()
         while new := {best - 1, best, best + 1} & set(range(len(LAG_GRID))) - evidences.keys():
@@ -223,18 +225,19 @@ class ErrorEstimates:
             pilot = model.with_errors(curve=curve, slopes=slopes, level=level_of_errors(solution))
         return pilot
 
-    def _evidence(self, model: StatisticalModel) -> float:
-        log_evidence = self._solution(model).log_evidence
-        if log_evidence is None:
-            raise ModelError(
-                f"noise '{model.noise}' needs the evidence, which this fit does not have: choose proper priors, and a "
-                "discrepancy and a method that give it, such as 'auto'."
-            )
-        return log_evidence
-
     def _solution(self, model: StatisticalModel) -> Solution:
         self._fits += 1
         return self._solve(model)
+
+
+def _evidence_of(solution: Solution, model: StatisticalModel) -> float:
+    """Return the log evidence of a solution, by which noises of a model are compared."""
+    if solution.log_evidence is None:
+        raise ModelError(
+            f"noise '{model.noise}' needs the evidence, which this fit does not have: choose proper priors, "
+            "and a discrepancy and a method that give it, such as 'auto'."
+        )
+    return solution.log_evidence
 
 
 def _spreads_that_are_told(experiment: Experiment) -> Sequence[tuple[str, ...]]:
