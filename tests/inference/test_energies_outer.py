@@ -12,7 +12,7 @@ import tissuq as tq
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.outer_search import relative_error
 from tissuq.inference.linear import times_gaussians
-from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points, log_normal
 from tissuq.model.noise import stress_level
 
 SKIN = Path(__file__).parents[3] / "shared" / "data" / "tissues" / "skin-porcine-p12ac1.csv"
@@ -190,6 +190,17 @@ def test_dispersed_fibres_are_found_in_five_tests_of_skin():
     low, high = solution.marginals["phi"].hdi()
     assert np.pi / 4 < low < high < np.pi / 2
     assert solution.marginals["kappa"].hdi()[1] < 0.15
+
+
+@pytest.mark.parametrize("dimension", [2, 3, 4, 5, 6, 9])
+def test_points_of_every_round_are_evenly_spread(dimension):
+    """Else the mass beside some plane is not seen: of six parameters this normalised density had a thousandth."""
+
+    def log_density(points):
+        return log_normal((points - 4 / np.sqrt(dimension)) / 0.3) - dimension * np.log(0.3)
+
+    adaptation = adapted(log_density, dimension, 64 * (dimension + 1), min_effective=50.0)
+    assert adaptation.log_mass == pytest.approx(0, abs=0.35)
 
 
 def test_the_proposal_is_a_normalised_density():

@@ -44,7 +44,10 @@ MIN_EFFECTIVE_SHARE = 0.3
 
 
 def even_points(dimension: int, count: int) -> FloatArray:
-    """Return evenly spread points (count, d) of the unit cube; every k-th of them are, too."""
+    """Return evenly spread points (count, d) of the unit cube; those of every slice of them are, too.
+
+    Of a line, every k-th of them.
+    """
     if dimension == 1:
         return (np.arange(count)[:, None] + 0.5) / count
     return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * _steps(dimension)) % 1.0)
@@ -187,7 +190,8 @@ def _search(
     proposal, proposals = start, list[Proposal]()
     points, values = np.zeros((0, dimension)), np.zeros(0)
     for round_ in range(MAX_ROUNDS):
-        new = proposal.points(uniforms[round_::MAX_ROUNDS])
+        of_round = slice(round_, None, MAX_ROUNDS) if dimension == 1 else slice(round_ * count, (round_ + 1) * count)
+        new = proposal.points(uniforms[of_round])
         proposals.append(proposal)
         points = np.concatenate([points, new])
         values = np.concatenate([values, log_density(new)])
@@ -200,8 +204,8 @@ def _search(
         away = points - mean
         covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
         proposal = Proposal(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
-        of_round = effective(values[-count:] - proposals[-1].log_density(new)) if power == 1 else 0.0
-        is_found = of_round > MIN_EFFECTIVE_SHARE * count
+        effective_new = effective(values[-count:] - proposals[-1].log_density(new)) if power == 1 else 0.0
+        is_found = effective_new > MIN_EFFECTIVE_SHARE * count
         if min_effective is not None:
             is_found = effective(log_weights) > min_effective
         adaptation = Adaptation(proposal, points, log_weights)
