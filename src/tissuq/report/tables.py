@@ -80,8 +80,10 @@ def significant(value: float | None, digits: int = 3) -> str:
 
 def interval(low: float, high: float, sd: float) -> tuple[str, str]:
     """Return the ends of an interval with the decimals that its width supports, and at most five digits."""
-    decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
     largest = max(abs(low), abs(high))
+    if 0 < largest < SMALLEST_PLAIN and not sd > 0:
+        sd = largest / 10  # three digits, where no width says how many
+    decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
     if 0 < largest < inf:
         decimals = min(decimals, MAX_DIGITS - 1 - floor(log10(largest)))
     low, high = (round(end, decimals) + 0.0 for end in (low, high))  # no minus before a zero
