@@ -114,7 +114,7 @@ BAD = [
     (["RUN", "--discrepancy", "none", "--data", "PLANAR", "--mode", "equibiaxial"],
      ["planar.csv", "measured in mode planar", "equibiaxial"]),
     (["RUN", "--discrepancy", "none", "--data", "PLANAR", "--stress-unit", "furlong"], ["'furlong'"]),
-    (["RUN", "--discrepancy", "none", "--mode", "equibiaxial", "--at", "1e160"], ["'1e160'", "undeformed length"]),
+    (["RUN", "--discrepancy", "none", "--mode", "equibiaxial", "--at", "1e160"], ["'1e160'", "not in percent"]),
     (["--config", "nowhere.toml"], ["nowhere.toml"]),
     (["RUN", "--config", "run.toml"], ["RUN", "--config"]),
     (["RUN", "--discrepancy", "none", "--out", "RUN", "--force"], ["is the run itself or contains it"]),

@@ -99,6 +99,9 @@ def test_of_a_run_of_several_laws_the_one_of_the_model_is_the_prior_and_of_sever
             posterior = tq.fit(data, material=law, discrepancy=discrepancy, noise_sd=0.01)
             posterior.save(tmp_path / folder / "posterior" / f"{name}.nc")
     assert list(priors_of_run(tmp_path / "laws", "yeoh", "MPa")[0]) == ["C10", "C20", "C30"]
+    (tmp_path / "laws" / "run.toml").write_text('laws = ["neo-hookean", "yeoh"]\n')
+    with pytest.raises(InputError, match=r"of the materials neo-hookean, yeoh, .* --material gent"):
+        priors_of_run(tmp_path / "laws", "gent", "MPa")
     file = tmp_path / "several" / "posterior" / "none.nc"
     with pytest.raises(InputError, match=f"several posteriors: .* --prior-run .* or {re.escape(str(file))}"):
         priors_of_run(tmp_path / "several", "neo-hookean", "MPa")

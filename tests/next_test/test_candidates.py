@@ -32,7 +32,7 @@ def test_other_texts_are_refused(text):
 
 
 def test_a_test_in_percent_is_refused():
-    with pytest.raises(tq.InputError, match="110 times the undeformed length: write stretches"):
+    with pytest.raises(tq.InputError, match="begins at 110: write stretches"):
         candidate_named("planar 110:130 6")
 
 

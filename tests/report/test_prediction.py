@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -153,6 +154,23 @@ def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(pos
     )
     assert "How the measurements are predicted" not in page
     assert "<img" not in page
+
+
+def test_a_stress_near_zero_beside_a_large_one_is_known(posterior, tmp_path):
+    """As that of the second axis where it is nearly free; only a band as wide as the other stress is none at all."""
+    found = predicted(posterior, mode="biaxial", stretch=[[1.0, 1.0], [1.2, 1.0]])
+    curves = dict(found.curves)
+    for key, band in curves.items():
+        if key[0] == 1:
+            curves[key] = replace(
+                band, median=0 * band.median + 1e-6, low=0 * band.low - 0.001, high=0 * band.high + 0.001
+            )
+    write_result(
+        prediction_result(replace(found, curves=curves), PredictionSettings(run="run"), tmp_path),
+        tmp_path,
+        figures=False,
+    )
+    assert "not known at all" not in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize("stretch", [[1.0, 1.1, 1.2], [1.0, 1.2, 9.0], [8.0, 9.0]])

@@ -13,12 +13,14 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["LARGE_STRETCH", "checked", "checked_points", "in_mpa"]
+__all__ = ["LARGE_STRETCH", "LEAST_PERCENT", "checked", "checked_points", "in_mpa"]
 
 FloatArray = NDArray[np.float64]
 
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken, or percent are meant."""
+LEAST_PERCENT = 30.0
+"""Beginning of a range of stretches or amounts of shear from which percent are meant."""
 
 
 def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:

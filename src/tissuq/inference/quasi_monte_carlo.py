@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "MAX_SEARCHES",
     "SHIFTS",
     "Adaptation",
     "Proposal",
@@ -131,11 +132,15 @@ def log_normal(points: FloatArray) -> FloatArray:
 
 
 class Adaptation(NamedTuple):
-    """A proposal, and the points (N, d) that led to it with log weights (N,): the density over what proposed them."""
+    """A proposal, and the points (N, d) that led to it with log weights (N,): the density over what proposed them.
+
+    ``is_settled`` says whether enough points were effective in the end, and the mass no longer changed.
+    """
 
     proposal: Proposal
     points: FloatArray
     log_weights: FloatArray
+    is_settled: bool = True
 
     @property
     def log_mass(self) -> float:
@@ -165,8 +170,8 @@ def adapted(
     uniforms = even_points(dimension, count * MAX_ROUNDS)
     proposal, log_mass = start or Proposal(np.zeros(dimension), np.eye(dimension)), None
     for _ in range(MAX_SEARCHES):
-        adaptation, is_near = _search(log_density, uniforms, proposal, min_effective, log_mass)
-        if is_near:
+        adaptation = _search(log_density, uniforms, proposal, min_effective, log_mass)
+        if adaptation.is_settled:
             break
         proposal, log_mass = adaptation.proposal, adaptation.log_mass
     return adaptation
@@ -178,8 +183,8 @@ def _search(
     start: Proposal,
     min_effective: float | None,
     log_mass: float | None,
-) -> tuple[Adaptation, bool]:
-    """Return what the rounds of one search lead to, and whether enough of their points are effective.
+) -> Adaptation:
+    """Return what the rounds of one search lead to.
 
     On the way along a ridge many points may be effective among those that lie lower, and the mass still grows: it is to
     have settled from one round to the next, from the search before to the first, unless the very first proposal was
@@ -211,8 +216,8 @@ def _search(
         adaptation = Adaptation(proposal, points, log_weights)
         earlier, log_mass = log_mass, adaptation.log_mass
         if is_found and (earlier is None or abs(log_mass - earlier) < MAX_CHANGE):
-            return adaptation, True
-    return adaptation, False
+            return adaptation
+    return adaptation._replace(is_settled=False)
 
 
 def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:

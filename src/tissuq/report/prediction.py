@@ -290,13 +290,19 @@ def _lead_of_bands(prediction: Prediction) -> str:
 
 
 def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
-    """Return every stress at a point in words: ``the stress is 5 kPa (95 %: 4 to 6)``, or that it is not known."""
+    """Return every stress at a point in words: ``the stress is 5 kPa (95 %: 4 to 6)``, or that it is not known.
+
+    Beside a larger stress at the same point, one near zero is known by the standard of that.
+    """
     texts = []
+    largest = max(
+        abs(prediction.curves[channel, kind, False].median[index]) for channel in range(len(prediction.stresses))
+    )
     for channel, name in enumerate(prediction.stresses):
         band, scale = prediction.curves[channel, kind, False], prediction.unit.to_mpa
         median, ends = (words(band, index, scale) for words in (median_words, end_words))
         half_width = (band.high[index] - band.low[index]) / 2
-        is_known = half_width <= UNKNOWN * abs(band.median[index]) or not half_width
+        is_known = half_width <= UNKNOWN * largest
         unit, percent = prediction.unit.name, f"{100 * prediction.prob:.4g} %"
         known, unknown = f"{median} {unit} ({percent}: {ends})", f"not known at all ({percent}: {ends} {unit})"
         texts.append(f"the {name} is {known if is_known else unknown}")

@@ -165,11 +165,11 @@ class CalibrationSettings(ModelSettings):
     @model_validator(mode="after")
     def _one_model(self) -> Self:
         if sum(bool(source) for source in (self.forward, self.umbridge, self.models)) != 1:
-            raise ValueError("give one forward model: a function in a file (forward), a server (umbridge) or a deck "
-                             "(model)")  # fmt: skip
+            raise ValueError("give one forward model: a function in a file (--forward), a server (--umbridge) or a "
+                             "deck (--model)")  # fmt: skip
         if not self.priors and self.prior_run is None:
             raise ValueError("give the prior of every parameter of the model, as in C10=uniform(0.1, 5), or a run "
-                             "whose posterior they are (prior_run)")  # fmt: skip
+                             "whose posterior they are (--prior-run)")  # fmt: skip
         if self.prior_run is not None and self.material is None:
             raise ValueError(
                 "a run as prior (--prior-run) needs the law in the forward model, whose posterior it is (--material)"

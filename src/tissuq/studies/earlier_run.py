@@ -210,6 +210,11 @@ def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior]
     law = material_named(material)
     files = posteriors_in(run) if run.is_dir() else {}
     if len(files) > 1 and not {law.name, Auto.name} & set(files):
+        if _compares_laws(run):
+            raise InputError(
+                f"the run '{run}' is of the materials {', '.join(files)}, and the forward model has {law.name}: fit "
+                f"the tests with --material {law.name} (--prior-run)."
+            )
         named = " or ".join(map(str, files.values()))
         raise InputError(f"the run '{run}' has several posteriors: give the file of one, --prior-run {named}.")
     posterior = load(run, law.name if law.name in files else None)

@@ -127,7 +127,7 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
     """
     import numpy as np
 
-    from tissuq.experiments.checked_arrays import LARGE_STRETCH
+    from tissuq.experiments.checked_arrays import LEAST_PERCENT
 
     is_range = ":" in text
     try:
@@ -139,9 +139,8 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
         raise InputError(
             f"'{text}' is not a range or list of stretches: write LOW:HIGH as 0.7:2.0, or a list as 1.1,1.2,1.5."
         )
-    if numbers.min() > LARGE_STRETCH:
+    if numbers.min() >= LEAST_PERCENT:
         raise InputError(
-            f"'{text}' begins at {numbers.min():g} times the undeformed length: write stretches as 0.7:2.0, not in "
-            "percent."
+            f"'{text}' begins at {numbers.min():g}: write stretches (or amounts of shear) as 0.7:2.0, not in percent."
         )
     return np.linspace(numbers[0], numbers[-1], points) if is_range else numbers

@@ -12,7 +12,7 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy, first_places, known_along, peaks
 from tissuq.inference.enumerators.nodes import Node, Sums
 from tissuq.inference.enumerators.outer import MAX_SCORE, TINY, Outer
-from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective
+from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, Proposal, adapted, effective
 from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["Guide", "relative_error", "weighted_nodes"]
@@ -121,7 +121,10 @@ class _Search:
         min_effective = guide.accuracy.min_effective
         adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
         guide.proposal, nodes = adaptation.proposal, nodes[-len(adaptation.points) :]
+        self._check_place(guide.proposal.mean)
         error = relative_error(self._outer, adaptation.log_weights, min_effective)
+        if not adaptation.is_settled:
+            raise _not_found(self._outer, f"the sum still changes after {MAX_SEARCHES} searches")
         return *_weighted(nodes, adaptation.log_weights - np.log(len(nodes))), error
 
     def _scouted(self, points: FloatArray) -> FloatArray:
@@ -169,12 +172,15 @@ def relative_error(outer: Outer, log_masses: FloatArray, min_effective: float) -
     """
     count = effective(log_masses)
     if count < min_effective:
-        raise ConvergenceError(
-            f"the posterior of {', '.join(outer.symbols)} was not found well enough to integrate the discrepancy: "
-            f"{count:.0f} of {len(log_masses)} values are effective. Give these parameters narrower priors, or choose "
-            "a material with fewer of them."
-        )
+        raise _not_found(outer, f"{count:.0f} of {len(log_masses)} values are effective")
     return float(np.sqrt(1 / count - 1 / len(log_masses)))
+
+
+def _not_found(outer: Outer, reason: str) -> ConvergenceError:
+    return ConvergenceError(
+        f"the posterior of {', '.join(outer.symbols)} was not found well enough to integrate the discrepancy: {reason}"
+        ". Give these parameters narrower priors, or choose a material with fewer of them."
+    )
 
 
 def _weighted(nodes: Sequence[Node], log_masses: FloatArray) -> tuple[list[Node], FloatArray]:
