@@ -92,6 +92,16 @@ def test_a_file_that_is_no_posterior_is_named_and_refused(cli, here):
     assert "'broken.nc' is damaged or no posterior of tissuq" in " ".join(said.err.split())
 
 
+@pytest.mark.parametrize("command", ["compare", "design", "export"])
+def test_measurements_in_place_of_a_run_are_named_as_such(cli, here, command):
+    (here / "test.csv").write_text("stretch,stress\n1,0\n1.1,2\n")
+    said = cli(command, "test.csv")
+    assert said.status == 2
+    assert "test.csv" in said.err
+    assert "damaged" not in said.err
+    assert "run" in said.err
+
+
 @pytest.mark.slow
 def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
     (two_runs / "other").mkdir()

@@ -67,6 +67,8 @@ def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:
     """Read the posteriors of runs, named by formulation, and by run where there are several."""
     import xarray as xr
 
+    from tissuq.posterior.archive import unreadable
+
     files: dict[str, Path] = {}
     for run in runs:
         paths = sorted((run / "posterior").glob("*.nc")) if run.is_dir() else [run]
@@ -80,9 +82,7 @@ def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:
         try:
             trees[name] = xr.open_datatree(path, engine="h5netcdf").load()
         except (OSError, ValueError, KeyError) as error:
-            raise InputError(
-                f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again."
-            ) from error
+            raise unreadable(path, error) from error
         trees[name].attrs |= _assessed(path)
     return trees
 

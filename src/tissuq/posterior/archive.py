@@ -25,7 +25,7 @@ from tissuq.parameters.priors import prior_from
 from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
 from tissuq.posterior.solver import Solver
 
-__all__ = ["read_modes", "read_solution", "solution_groups"]
+__all__ = ["read_modes", "read_solution", "solution_groups", "unreadable"]
 
 T = TypeVar("T", Material, Discrepancy)
 
@@ -231,9 +231,16 @@ def read_solution(
     except TissuqError:
         raise
     except Exception as error:  # whatever a damaged file makes the readers of HDF5, JSON and arrays raise
-        raise InputError(
-            f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again."
-        ) from error
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: Path, error: Exception) -> InputError:
+    """Return what to say of a file that could not be read as a posterior."""
+    if path.suffix != ".nc":
+        return InputError(
+            f"'{path}' is no posterior: give the folder of a run, as in runs/specimen, or an .nc file in it."
+        )
+    return InputError(f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again.")
 
 
 def read_modes(path: Path) -> list[str]:
@@ -248,9 +255,7 @@ def read_modes(path: Path) -> list[str]:
         with opened(path) as file:
             return sorted({str(test.attrs["mode"]) for test in file[FIT][TESTS].values()})
     except Exception as error:  # as in `read_solution`
-        raise InputError(
-            f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again."
-        ) from error
+        raise unreadable(path, error) from error
 
 
 def _solution(groups: Mapping[str, Group], model: StatisticalModel) -> Solution:

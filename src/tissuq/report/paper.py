@@ -57,7 +57,7 @@ NOTE = (
     "included: wider boxes lower it. {nuts}With the Mooney-Rivlin term the initial shear modulus is 2 (C10 + C01), so "
     "C10 alone is not half the modulus there."
 )
-AGREEMENT = ["formulation", "mean", "sd ratio", "HPD low", "HPD high", "R-hat", "ESS", "converged"]
+AGREEMENT = ["formulation", "mean", "sd ratio", "95 % low", "95 % high", "R-hat", "ESS", "converged"]
 
 
 def paper_result(study: PaperStudy) -> Result:
