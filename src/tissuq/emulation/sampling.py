@@ -21,7 +21,7 @@ __all__ = ["SampledPosterior", "sample_posterior"]
 
 FloatArray = NDArray[np.float64]
 
-SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 8, 32
+SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 16, 32
 """Points of a search round; points of a sampling round, the number of these, and where it does not suffice, at most."""
 COMPONENTS, FITTED_POINTS, FIT_STEPS = 4, 1024, 12
 """Gaussians of a proposal, points to which they are fitted, and the steps of the fit."""
