@@ -90,8 +90,11 @@ def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
 
 
 @pytest.mark.slow
-def test_the_next_step_names_all_options_that_a_law_needs(calibrate_run):
-    _, said = calibrate_run
+def test_the_next_step_names_all_options_that_a_law_needs(tmp_path):
+    """Where the emulator is good enough beside the noise, here an unknown one."""
+    write_all(tmp_path)
+    options = [*PRIORS, "--runs", 16, "--discrepancy", "gp-pinned", "--no-figures", "--out", "run"]
+    said = run_in(tmp_path, "calibrate", "punch.csv", "--forward", "force.py:force", *options)
     assert "--material LAW --range LOW:HIGH --force" in " ".join(said.out.split())
 
 
