@@ -62,27 +62,32 @@ def test_a_new_patient_is_drawn_as_predicted_for_measurements_that_were_not_fitt
     plt.close(axis.figure)
 
 
-def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
+def drawn_axis(rows, medians, width, unit):
+    """The axis of a population of one parameter, from its quantities with intervals and its specimens' medians."""
     import pandas as pd
 
     ends = ["median", "hdi_low", "hdi_high"]
+    summary = pd.DataFrame.from_dict({("C10", name): row for name, row in rows.items()}, "index", columns=ends)
+    summary.index = pd.MultiIndex.from_tuples(summary.index)
+    specimens = pd.DataFrame.from_dict(
+        {(name, "C10"): [m, (1 - width) * m, (1 + width) * m] * 2 for name, m in medians.items()},
+        "index", columns=[*ends, *(f"alone_{end}" for end in ends)],
+    )  # fmt: skip
+    specimens.index = pd.MultiIndex.from_tuples(specimens.index)
+    with panels(plt.subplots()[1], 1) as drawn:
+        draw_specimens(drawn, summary, specimens, {"C10": unit})
+    (axis,) = drawn.axes
+    return axis
+
+
+def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
     rows = {
         "median": [0.5, 0.4, 0.6],
         "spread": [1, 0.5, 2],
         "new patient": [0.5, 0.1, 9],
         "complete pooling": [0.5, 0.499, 0.501],
     }
-    summary = pd.DataFrame.from_dict({("C10", name): row for name, row in rows.items()}, "index", columns=ends)
-    summary.index = pd.MultiIndex.from_tuples(summary.index)
-    medians = {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.45, "stiff": 30.0}
-    specimens = pd.DataFrame.from_dict(
-        {(name, "C10"): [m, 0.9 * m, 1.1 * m] * 2 for name, m in medians.items()},
-        "index", columns=[*ends, *(f"alone_{end}" for end in ends)],
-    )  # fmt: skip
-    specimens.index = pd.MultiIndex.from_tuples(specimens.index)
-    with panels(plt.subplots()[1], 1) as drawn:
-        draw_specimens(drawn, summary, specimens, {"C10": "MPa"})
-    (axis,) = drawn.axes
+    axis = drawn_axis(rows, {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.45, "stiff": 30.0}, 0.1, "MPa")
     low, high = axis.get_xlim()
     assert 0.1 < low < 0.36
     assert 0.66 < high < 1
@@ -93,20 +98,8 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
 
 
 def test_specimens_that_differ_by_orders_of_magnitude_are_on_a_logarithmic_axis():
-    import pandas as pd
-
-    ends = ["median", "hdi_low", "hdi_high"]
     rows = {name: [5.0, 0.1, 200.0] for name in ("median", "spread", "new patient", "complete pooling")}
-    summary = pd.DataFrame.from_dict({("C10", name): row for name, row in rows.items()}, "index", columns=ends)
-    summary.index = pd.MultiIndex.from_tuples(summary.index)
-    specimens = pd.DataFrame.from_dict(
-        {(f"S{m}", "C10"): [m, 0.99 * m, 1.01 * m] * 2 for m in (0.2, 0.9, 3.1, 10.0, 41.0, 160.0)},
-        "index", columns=[*ends, *(f"alone_{end}" for end in ends)],
-    )  # fmt: skip
-    specimens.index = pd.MultiIndex.from_tuples(specimens.index)
-    with panels(plt.subplots()[1], 1) as drawn:
-        draw_specimens(drawn, summary, specimens, {"C10": "kPa"})
-    (axis,) = drawn.axes
+    axis = drawn_axis(rows, {f"S{m}": m for m in (0.2, 0.9, 3.1, 10.0, 41.0, 160.0)}, 0.01, "kPa")
     low, high = axis.get_xlim()
     assert axis.get_xscale() == "log"
     assert 0 < low < 0.2 < 160 < high

@@ -13,7 +13,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["LARGE_STRETCH", "LEAST_PERCENT", "checked", "checked_points", "in_mpa"]
+__all__ = ["LARGE_STRETCH", "check_no_percent", "checked", "checked_points", "in_mpa"]
 
 FloatArray = NDArray[np.float64]
 
@@ -21,6 +21,14 @@ LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken, or percent are meant."""
 LEAST_PERCENT = 30.0
 """Beginning of a range of stretches or amounts of shear from which percent are meant."""
+
+
+def check_no_percent(text: str, beginning: float, example: str) -> None:
+    """Refuse a text about stretches or amounts of shear that begin where percent are meant."""
+    if beginning >= LEAST_PERCENT:
+        raise InputError(
+            f"'{text}' begins at {beginning:g}: write stretches (or amounts of shear) as {example}, not in percent."
+        )
 
 
 def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:

@@ -167,19 +167,27 @@ def adapted(
     round).
     """
     count = count or 16 + 16 * dimension
-    uniforms = even_points(dimension, count * MAX_ROUNDS)
+    rounds = _rounds(dimension, count)
     proposal, log_mass = start or Proposal(np.zeros(dimension), np.eye(dimension)), None
     for _ in range(MAX_SEARCHES):
-        adaptation = _search(log_density, uniforms, proposal, min_effective, log_mass)
+        adaptation = _search(log_density, rounds, proposal, min_effective, log_mass)
         if adaptation.is_settled:
             break
         proposal, log_mass = adaptation.proposal, adaptation.log_mass
     return adaptation
 
 
+def _rounds(dimension: int, count: int) -> FloatArray:
+    """Return points (rounds, count, d) of the unit cube, evenly spread in each round and together."""
+    points = even_points(dimension, MAX_ROUNDS * count)
+    if dimension == 1:
+        return points.reshape(count, MAX_ROUNDS, 1).swapaxes(0, 1)
+    return points.reshape(MAX_ROUNDS, count, dimension)
+
+
 def _search(
     log_density: Callable[[FloatArray], FloatArray],
-    uniforms: FloatArray,
+    rounds: FloatArray,
     start: Proposal,
     min_effective: float | None,
     log_mass: float | None,
@@ -190,13 +198,12 @@ def _search(
     have settled from one round to the next, from the search before to the first, unless the very first proposal was
     good enough.
     """
-    dimension, count = uniforms.shape[1], len(uniforms) // MAX_ROUNDS
+    _, count, dimension = rounds.shape
     least_effective = 4.0 + 4 * dimension
     proposal, proposals = start, list[Proposal]()
     points, values = np.zeros((0, dimension)), np.zeros(0)
-    for round_ in range(MAX_ROUNDS):
-        of_round = slice(round_, None, MAX_ROUNDS) if dimension == 1 else slice(round_ * count, (round_ + 1) * count)
-        new = proposal.points(uniforms[of_round])
+    for uniforms in rounds:
+        new = proposal.points(uniforms)
         proposals.append(proposal)
         points = np.concatenate([points, new])
         values = np.concatenate([values, log_density(new)])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.modulus import modulus_moments
 from tissuq.errors import InputError
-from tissuq.experiments.checked_arrays import LEAST_PERCENT, checked_points
+from tissuq.experiments.checked_arrays import check_no_percent, checked_points
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -116,8 +116,7 @@ def candidate_named(text: str) -> Candidate:
             f"'{text}' does not describe a test; write MODE LOW:HIGH POINTS, as in 'planar 1:1.5 20' (stretches, or "
             "amounts of shear)."
         )
-    if low >= LEAST_PERCENT:
-        raise InputError(f"'{text}' begins at {low:g}: write stretches (or amounts of shear) as 1:1.5, not in percent.")
+    check_no_percent(text, low, "1:1.5")
     return Candidate(mode, np.linspace(low, high, count) if count > 1 else [high])
 
 

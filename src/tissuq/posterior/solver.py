@@ -14,7 +14,6 @@ from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.enumerators.outer_search import Guide
-from tissuq.inference.enumerators.quadrature import RELATIVE_TOLERANCE, ROUGH_TOLERANCE
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates
@@ -101,13 +100,12 @@ class Solver:
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy))
-        tolerance = RELATIVE_TOLERANCE if accuracy == FINE else ROUGH_TOLERANCE
         are_checked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
-            return self._solve([model], AdaptiveCells(next(are_checked, False), tolerance))[0]
+            return self._solve([model], AdaptiveCells(next(are_checked, False), accuracy.tolerance))[0]
 
         return solve_known
 

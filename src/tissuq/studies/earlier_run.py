@@ -211,20 +211,20 @@ def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior]
     files = posteriors_in(run) if run.is_dir() else {}
     if len(files) > 1 and not {law.name, Auto.name} & set(files):
         if _compares_laws(run):
-            raise InputError(
-                f"the run '{run}' is of the materials {', '.join(files)}, and the forward model has {law.name}: fit "
-                f"the tests with --material {law.name} (--prior-run)."
-            )
+            raise _of_other_materials(run, list(files), law)
         named = " or ".join(map(str, files.values()))
         raise InputError(f"the run '{run}' has several posteriors: give the file of one, --prior-run {named}.")
     posterior = load(run, law.name if law.name in files else None)
-    fitted = posterior.model.material
-    if law.name != fitted.name:
-        raise InputError(
-            f"the run '{run}' is of the material {fitted.name}, and the forward model has {law.name}: fit the tests "
-            f"with --material {law.name} (--prior-run)."
-        )
+    if law.name != posterior.model.material.name:
+        raise _of_other_materials(run, [posterior.model.material.name], law)
     return priors_of(posterior, unit)
+
+
+def _of_other_materials(run: Path, names: list[str], law: Material) -> InputError:
+    return InputError(
+        f"the run '{run}' is of the material{'s' * (len(names) > 1)} {', '.join(names)}, and the forward model has "
+        f"{law.name}: fit the tests with --material {law.name} (--prior-run)."
+    )
 
 
 def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior], dict[tuple[str, str], float]]:

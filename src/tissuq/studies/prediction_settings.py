@@ -127,7 +127,7 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
     """
     import numpy as np
 
-    from tissuq.experiments.checked_arrays import LEAST_PERCENT
+    from tissuq.experiments.checked_arrays import check_no_percent
 
     is_range = ":" in text
     try:
@@ -139,8 +139,5 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
         raise InputError(
             f"'{text}' is not a range or list of stretches: write LOW:HIGH as 0.7:2.0, or a list as 1.1,1.2,1.5."
         )
-    if numbers.min() >= LEAST_PERCENT:
-        raise InputError(
-            f"'{text}' begins at {numbers.min():g}: write stretches (or amounts of shear) as 0.7:2.0, not in percent."
-        )
+    check_no_percent(text, float(numbers.min()), "0.7:2.0")
     return np.linspace(numbers[0], numbers[-1], points) if is_range else numbers

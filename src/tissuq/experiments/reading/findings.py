@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poi
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["concerned", "data_warnings"]
+__all__ = ["data_warnings"]
 
 MANY_ROWS = 10_000
 """Rows from which thinning is worth a word."""
@@ -324,19 +324,3 @@ CHECKS: Mapping[Callable[[Reading, int], str], tuple[str, Severity]] = {
     _diameter: CAUTION,
     _many: NOTE,
 }
-
-
-def concerned(messages: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the names that every text concerns, of pairs of a name and a text, both in the order of the first.
-
-    Examples
-    --------
-    >>> concerned([("A", "torn"), ("B", "torn"), ("B", "slack")])
-    {'torn': ['A', 'B'], 'slack': ['B']}
-    """
-    names: dict[str, list[str]] = {}
-    for name, text in messages:
-        of_text = names.setdefault(text, [])
-        if name not in of_text:
-            of_text.append(name)
-    return names

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -20,7 +20,6 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
-from tissuq.experiments.reading.findings import concerned
 from tissuq.experiments.reading.labels import check_labels, columns_only
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
@@ -91,10 +90,26 @@ def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False)
     """Return all tests in one file or table, and warn of what there is to know of them."""
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
-    noted = concerned((test.name, text) for test in tests for text in test.reading.notes)
+    noted = _concerned((test.name, text) for test in tests for text in test.reading.notes)
     for text, names in noted.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=3)
     return [test.reading.experiment for test in tests]
+
+
+def _concerned(messages: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Return the names that every text concerns, of pairs of a name and a text, both in the order of the first.
+
+    Examples
+    --------
+    >>> _concerned([("A", "torn"), ("B", "torn"), ("B", "slack")])
+    {'torn': ['A', 'B'], 'slack': ['B']}
+    """
+    names: dict[str, list[str]] = {}
+    for name, text in messages:
+        of_text = names.setdefault(text, [])
+        if name not in of_text:
+            of_text.append(name)
+    return names
 
 
 def _is_read(data: Any) -> bool:

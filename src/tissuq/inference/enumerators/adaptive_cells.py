@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, ModelError
+from tissuq.inference.enumerators.line import FINE
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
-    RELATIVE_TOLERANCE,
     START_PROBABILITIES,
     Lines,
     Quadrature,
@@ -65,7 +65,7 @@ class AdaptiveCells:
     """
 
     is_checked: bool = True
-    tolerance: float = RELATIVE_TOLERANCE
+    tolerance: float = FINE.tolerance
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""

@@ -48,6 +48,8 @@ class Accuracy(NamedTuple):
         Effective number, at the least, of quasi-random points of a density of more coordinates.
     bounded_points : int
         Points, at most, of which masses are computed within bounds of more parameters than two.
+    tolerance : float
+        Of the interpolation of adaptive quadrature, relative to its integral.
     """
 
     max_difference: float
@@ -56,10 +58,11 @@ class Accuracy(NamedTuple):
     probabilities: tuple[float, ...]
     min_effective: float
     bounded_points: int
+    tolerance: float
 
 
-FINE = Accuracy(2.0, 0.22, 6.5, (0.001, 0.012, 0.06, 0.16, 0.32, 0.5, 0.68, 0.84, 0.94, 0.988, 0.999), 20.0, 8000)
-ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0, 500)
+FINE = Accuracy(2.0, 0.22, 6.5, (0.001, 0.012, 0.06, 0.16, 0.32, 0.5, 0.68, 0.84, 0.94, 0.988, 0.999), 20.0, 8000, 1e-3)
+ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0, 500, 0.03)
 
 
 @dataclass(frozen=True)

@@ -12,18 +12,9 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
+from tissuq.inference.enumerators.line import FINE
 
-__all__ = [
-    "MAX_DIMENSION",
-    "RELATIVE_TOLERANCE",
-    "ROUGH_TOLERANCE",
-    "START_PROBABILITIES",
-    "Lines",
-    "Quadrature",
-    "gauss_rule",
-    "has_missed",
-    "integrate",
-]
+__all__ = ["MAX_DIMENSION", "START_PROBABILITIES", "Lines", "Quadrature", "gauss_rule", "has_missed", "integrate"]
 
 FloatArray = NDArray[np.float64]
 LogFunction = Callable[[FloatArray], FloatArray]
@@ -33,8 +24,6 @@ ORDERS = {1: 10, 2: 10, 3: 7}
 """Gauss-Legendre points along each side of a cell, by dimension."""
 FIRST_CELLS_PER_SIDE = 2
 """Cells along each side to begin with."""
-RELATIVE_TOLERANCE, ROUGH_TOLERANCE = 1e-3, 0.03
-"""Of the interpolation, over the integral, at which cells are no longer halved; and where a rough integral will do."""
 MAX_CELLS = 20_000
 
 
@@ -152,7 +141,7 @@ class Quadrature:
         )
 
 
-def integrate(log_function: LogFunction, dimension: int, tolerance: float = RELATIVE_TOLERANCE) -> Quadrature:
+def integrate(log_function: LogFunction, dimension: int, tolerance: float = FINE.tolerance) -> Quadrature:
     """Integrate exp(log_function) over the unit cube of one to three dimensions, for B functions at once.
 
     Cells are halved along the side in which a function is worst resolved until the interpolation error of every
