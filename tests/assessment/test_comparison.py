@@ -109,6 +109,18 @@ def test_fits_of_other_data_and_single_fits_are_refused(fits):
         tq.compare({"none": fits["none"], "foreign": xr.DataTree()})
 
 
+def test_the_same_measurements_in_two_units_are_compared(fits):
+    rounded = [float(f"{stress * 1e3:.4g}") for stress in DATA.stress]
+    in_kpa = tq.Experiment("uniaxial", STRETCH, rounded, stress_unit="kPa")
+    table = tq.compare({"MPa": fits["yeoh"], "kPa": tq.fit(in_kpa, discrepancy="yeoh", noise_sd=0.05)})
+    assert table["probability"].to_numpy(float) == pytest.approx([0.5, 0.5], abs=0.01)
+    other = np.array(rounded) / 1e3
+    other[5] += 0.001 * other.max()
+    changed = tq.fit(tq.Experiment("uniaxial", STRETCH, other), discrepancy="none", noise_sd=0.05)
+    with pytest.raises(tq.InputError, match="different measurements"):
+        tq.compare({"none": fits["none"], "changed": changed})
+
+
 def test_fits_of_different_materials_are_compared_by_their_initial_shear_modulus(fits):
     mooney = tq.fit(DATA, material="mooney-rivlin", discrepancy="none", noise_sd=0.05, tolerances="tissue")
     table = tq.compare({"none": fits["none"], "mooney": mooney})

@@ -70,6 +70,15 @@ def test_two_stresses_of_one_test_are_two_curves_of_it():
     assert second.stretch.tolist() == [0.8, 1.1, 1.3]
 
 
+def test_measurements_are_the_same_in_any_unit():
+    stress = [0.1 * 3, 0.7, 1.1]
+    test = tq.Experiment("uniaxial", [1.1, 1.2, 1.3], stress)
+    in_pa = tq.Experiment("uniaxial", [1.1, 1.2, 1.3], [value * 1e6 / 3 * 3 for value in stress], stress_unit="Pa")
+    assert not np.array_equal(test.stress, in_pa.stress)
+    assert test.has_measurements_of(in_pa)
+    assert not test.has_measurements_of(tq.Experiment("uniaxial", [1.1, 1.2, 1.3], [0.3, 0.7, 1.1001]))
+
+
 def test_a_single_test_stays_as_it_is():
     assert tq.Experiment.of(TESTS[0]) is TESTS[0]
     assert tq.Experiment.of(TESTS[:1]) is TESTS[0]

@@ -13,7 +13,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["LARGE_STRETCH", "check_no_percent", "checked", "checked_points", "in_mpa"]
+__all__ = ["LARGE_STRETCH", "agree", "check_no_percent", "checked", "checked_points", "in_mpa"]
 
 FloatArray = NDArray[np.float64]
 
@@ -21,6 +21,15 @@ LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken, or percent are meant."""
 LEAST_PERCENT = 30.0
 """Beginning of a range of stretches or amounts of shear from which percent are meant."""
+CONVERSION_ERROR = 1e-9
+"""Largest difference, as a share of the largest value, between the same measurements converted from two units."""
+
+
+def agree(values: FloatArray, others: FloatArray, share: float = CONVERSION_ERROR) -> bool:
+    """Return whether two arrays are of one shape, and nowhere differ by more than a share of the largest value."""
+    return values.shape == others.shape and bool(
+        np.abs(values - others).max(initial=0.0) <= share * np.abs(values).max(initial=0.0)
+    )
 
 
 def check_no_percent(text: str, beginning: float, example: str) -> None:

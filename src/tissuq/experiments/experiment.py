@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
-from tissuq.experiments.checked_arrays import checked, checked_points, in_mpa
+from tissuq.experiments.checked_arrays import agree, checked, checked_points, in_mpa
 from tissuq.experiments.curve import Curve, draw_curves, small_svg
 from tissuq.experiments.modes import LoadingMode, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
@@ -334,11 +334,9 @@ class Experiment:
         return self._of_curves(curves)
 
     def has_measurements_of(self, experiment: Experiment) -> bool:
-        """Return whether another experiment has the same curves."""
+        """Return whether another experiment has the same curves, be it read in another unit."""
         return len(self.curves) == len(experiment.curves) and all(
-            curve.mode == same.mode
-            and np.array_equal(curve.points, same.points)
-            and np.array_equal(curve.stress, same.stress)
+            curve.mode == same.mode and agree(curve.points, same.points) and agree(curve.stress, same.stress)
             for curve, same in zip(self.curves, experiment.curves, strict=True)
         )
 

@@ -57,7 +57,7 @@ def _equal_specimens(population: PopulationDraws) -> Iterator[str]:
     copies = dict.fromkeys(" and ".join(names) for names in alike if len(names) > 1)
     if copies:
         yield (
-            f"the measurements of {'; of '.join(copies)} are equal to the last digit, as copies are: keep one of "
+            f"the measurements of {'; of '.join(copies)} are equal, as copies are: keep one of "
             "them, for copies make the spread between specimens smaller than it is."
         )
 
