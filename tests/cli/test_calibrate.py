@@ -223,6 +223,27 @@ def test_of_columns_of_one_name_the_number_is_asked_for(cli, here):
     assert "has 2 columns 'depth': give the number of one, 1 or 3" in " ".join(said.err.split())
 
 
+def test_several_specimens_are_refused_until_one_is_read(tmp_path):
+    write_all(tmp_path)
+    heading, *rows = (tmp_path / "punch.csv").read_text().splitlines()
+    others = [f"{depth},{1.5 * float(force):.5f}" for depth, force in (row.split(",") for row in rows)]
+    labelled = [f"{name},{row}" for name, test in (("S1", rows), ("S2", others)) for row in test]
+    (tmp_path / "both.csv").write_text("\n".join([f"specimen,{heading}", *labelled]))
+    arguments = ["calibrate", "both.csv", "--forward", "force.py:force", *USUAL, "--no-figures", "--out", "run"]
+    arguments += ["--control", "depth", "--measured", "force"]
+    said = run_in(tmp_path, *arguments)
+    assert said.status == 2
+    assert "column 'specimen' names several tests: 'S1', 'S2'. To read one of them give --only 'specimen=S1'." in (
+        " ".join(said.err.split())
+    )
+    assert not list(tmp_path.glob("run*"))
+    said = run_in(tmp_path, *arguments, "--only", "specimen=S2")
+    assert said.status == 0, said.err
+    with (tmp_path / "run" / "prediction.csv").open(newline="") as lines:
+        measured = [float(row["measured"]) for row in csv.DictReader(lines)]
+    assert measured == [float(row.split(",")[1]) for row in others]
+
+
 def test_a_material_without_its_range_or_parameters_is_refused_before_any_run(tmp_path):
     write_all(tmp_path)
     usual = ["calibrate", "punch.csv", "--forward", "force.py:force", *USUAL, "--out", "run"]

@@ -17,6 +17,8 @@ from tissuq.emulation.problem import symbol_of
 from tissuq.errors import InputError
 from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.headings import heading, plain
+from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.several_specimens import SeveralSpecimens, check_one_specimen, only_rows
 from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.units import measured_in, stress_unit
@@ -191,7 +193,7 @@ def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measur
 
 
 def _table(path: Path, settings: CalibrationSettings) -> Table:
-    table = read_table(path, settings.skip_rows, settings.sheet)
+    table = only_rows(read_table(path, settings.skip_rows, settings.sheet), settings.only)
     if settings.leave_out is None:
         return table
     remaining = np.flatnonzero(~rows_in(settings.leave_out, table.lines, table.file))
@@ -242,9 +244,19 @@ def _control(table: Table, measured: Sequence[int], requested: str | int | None)
 
 def _measured(table: Table, columns: tuple[int, int], stride: int) -> Measured:
     control, measured = (column[::stride] for column in table.numbers(columns))
+    _check_one_specimen(table, columns)
     control_label, measured_label = (_label(table, index) for index in columns)
     units = declared_unit(table, columns[0]), declared_unit(table, columns[1])
     return Measured(control, measured, control_label, measured_label, units)
+
+
+def _check_one_specimen(table: Table, columns: tuple[int, int]) -> None:
+    """Refuse rows of several specimens, as a fit does: their parameters would be taken for the same."""
+    (control,) = table.numbers(columns[:1])
+    try:
+        check_one_specimen(table, [ColumnChoice(*columns)], control)
+    except SeveralSpecimens as several:
+        raise SeveralSpecimens(several.place, several.column, several.labels) from several
 
 
 def _places(table: Table, requested: Sequence[str | int | None]) -> tuple[int, int]:

@@ -14,7 +14,7 @@ from tissuq.studies.model_settings import ModelSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import column, number_or_text, pairs_of, priors, sd_or_unknown
 from tissuq.studies.settings import positive_or_unknown
-from tissuq.studies.shared_options import seed
+from tissuq.studies.shared_options import only_rows, seed
 
 if TYPE_CHECKING:
     from tissuq.emulation.deck_forward import DeckForward
@@ -138,6 +138,7 @@ class CalibrationSettings(ModelSettings):
     )
     range: str | None = option(None, "With --material: smallest and largest stretch, such as 0.7:1.3.")
     mode: str = option("uniaxial", "With --material: loading mode of the range.")
+    only: dict[str, str | int] = only_rows()
     leave_out: str | None = option(None, "Lines of the file to leave out, such as 31,45:50.")
     every: int = option(1, "Use only every N-th row.", ge=1)
     sheet: str | int | None = option(None, "Sheet of an Excel workbook, by name or number.", parse=column)

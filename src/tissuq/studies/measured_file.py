@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from tissuq.studies.option import Settings, option
 from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown, tolerances
 from tissuq.studies.settings import SizesOfErrors, looked_up, positive_or_unknown
-from tissuq.studies.shared_options import seed
+from tissuq.studies.shared_options import only_rows, seed
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
-reading = partial(option, group="Reading files")
+READING = "Reading files"
+reading = partial(option, group=READING)
 """Declares an option of reading."""
 
 
@@ -72,11 +73,7 @@ class ReadingSettings(Settings):
             "diameter": "Of a round specimen, instead of --area; of a tube the undeformed outer one.",
         },
     )
-    only: dict[str, str | int] = reading(
-        default_factory=dict,
-        help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat.",
-        parse=pairs_of("--only", "a choice of rows", "COLUMN=VALUE, such as Specimen=S1", divided_last=True),
-    )
+    only: dict[str, str | int] = only_rows(READING)
     compression_positive: bool | None = reading(
         None, "Which the file counts as positive [its sign].", negative="tension-positive"
     )

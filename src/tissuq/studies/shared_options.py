@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 from tissuq.errors import InputError
 from tissuq.parameters.checks import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option_texts import pairs_of
 
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
 
-__all__ = ["RunSettings", "mesh_order", "sampling", "seed"]
+__all__ = ["RunSettings", "mesh_order", "only_rows", "sampling", "seed"]
 
 
 class RunSettings(Settings):
@@ -33,6 +34,16 @@ class RunSettings(Settings):
         if own is not None and self.material not in (None, own.name):
             raise InputError(f"--user-law names the law '{own.name}', and --material '{self.material}': give one law.")
         return own or self.material
+
+
+def only_rows(group: str = "") -> Any:
+    """Declare the rows of a file that are read: those of one specimen."""
+    return option(
+        default_factory=dict,
+        group=group,
+        help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat.",
+        parse=pairs_of("--only", "a choice of rows", "COLUMN=VALUE, such as Specimen=S1", divided_last=True),
+    )
 
 
 def seed() -> Any:

@@ -45,16 +45,22 @@ class SeveralSpecimens(InputError):
 
     Parameters
     ----------
-    message : str
+    place : str
+        Of the column that tells them apart.
     column : str
-        Name of the column that tells them apart, or its number from 1.
+        Its name, or its number from 1.
     labels : sequence of str
         Its cells, one a row.
+    advice : str
+        What else may be done than reading one of them.
     """
 
-    def __init__(self, message: str, column: str, labels: Sequence[str]) -> None:
-        super().__init__(message)
-        self.column, self.labels = column, labels
+    def __init__(self, place: str, column: str, labels: Sequence[str], advice: str = "") -> None:
+        super().__init__(
+            f"{place} names several tests: {_listed(labels)}. To read one of them give --only "
+            f"'{column}={labels[0]}'{advice}."
+        )
+        self.place, self.column, self.labels = place, column, labels
 
 
 def only_rows(table: Table, only: Mapping[str, str | int] | None) -> Table:
@@ -108,11 +114,11 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
             f"; to fit each and the population that they are from: tissuq population FILE --specimen-column '{name}'"
         )
         raise SeveralSpecimens(
-            f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
-            f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}}; tissuq.read_tests reads all)"
-            f"{fit_all if len(distinct) >= SPECIMENS_OF_POPULATION else ''}.",
+            table.place(column),
             name,
             labels,
+            f" (in Python only={{'{name}': '{labels[0]}'}}; tissuq.read_tests reads all)"
+            f"{fit_all if len(distinct) >= SPECIMENS_OF_POPULATION else ''}",
         )
 
 
