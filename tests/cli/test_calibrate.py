@@ -244,6 +244,55 @@ def test_several_specimens_are_refused_until_one_is_read(tmp_path):
     assert measured == [float(row.split(",")[1]) for row in others]
 
 
+TENSION = """
+def stress(parameters, stretch):
+    return 2 * parameters["C10"] * (stretch - stretch**-2)
+"""
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """A run whose file is in kPa; of its rows, the first are not fitted."""
+    folder = tmp_path_factory.mktemp("fitted")
+    (folder / "tension.py").write_text(TENSION)
+    stretch = np.round(np.linspace(1.0, 1.3, 16), 3)
+    stress = 6 * (stretch - stretch**-2) + 0.02 * np.random.default_rng(4).standard_normal(16)
+    rows = list(zip(stretch, np.round(stress, 4), strict=True))
+    (folder / "tension.csv").write_text("stretch,stress (kPa)\n" + "".join(f"{a},{b}\n" for a, b in rows))
+    (folder / "again.csv").write_text("l,force (N)\n" + "".join(f"{a},{20e-6 * b:.5g}\n" for a, b in rows[4:]))
+    options = ["--discrepancy", "none", "--stretch", "1.07:1.3", "--no-figures", "--out", "run"]
+    said = run_in(folder, "fit", "tension.csv", *options)
+    assert said.status == 0, said.err
+    return folder
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "tension.csv",  # all rows of the file, of which the run fitted some
+        "again.csv",  # those that it fitted, as forces and to five digits
+    ],
+)
+@pytest.mark.parametrize("source", ["run", "run/posterior/none.nc"])
+def test_the_posterior_of_the_measurements_is_no_prior_of_them(fitted, file, source):
+    options = ["--forward", "tension.py:stress", "--material", "neo-hookean", "--range", "1:1.3", "--unit", "kPa"]
+    said = run_in(fitted, "calibrate", file, *options, "--prior-run", source, "--runs", 8, "--out", "out")
+    assert said.status == 2
+    assert "which would count twice" in " ".join(said.err.split())
+    assert not list(fitted.glob("out*"))
+
+
+def test_the_posterior_of_other_measurements_is_a_prior(fitted):
+    rows = [row.split(",") for row in (fitted / "tension.csv").read_text().splitlines()[1:]]
+    noise = 0.02 * np.random.default_rng(5).standard_normal(len(rows))
+    other = "".join(f"{a},{float(b) + error:.4f}\n" for (a, b), error in zip(rows, noise, strict=True))
+    (fitted / "other.csv").write_text("stretch,stress (kPa)\n" + other)
+    options = ["--forward", "tension.py:stress", "--material", "neo-hookean", "--range", "1:1.3", "--unit", "kPa"]
+    options += ["--noise-sd", 0.02, "--no-figures"]
+    said = run_in(fitted, "calibrate", "other.csv", *options, "--prior-run", "run", "--runs", 8, "--out", "other")
+    assert said.status == 0, said.err
+
+
 def test_a_material_without_its_range_or_parameters_is_refused_before_any_run(tmp_path):
     write_all(tmp_path)
     usual = ["calibrate", "punch.csv", "--forward", "force.py:force", *USUAL, "--out", "run"]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.sensitivity import SCALE_FACTORS
 from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
-from tissuq.experiments.checked_arrays import agree
+from tissuq.experiments.checked_arrays import FOUR_DIGITS, agree
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
@@ -191,9 +191,6 @@ def _check_average(fits: Mapping[str, Any]) -> None:
 
 FloatArray = NDArray[np.float64]
 
-ROUNDING = 5e-4
-"""Largest difference, as a share of the largest value, between the same measurements in files of other digits: that of
-rounding to four, and less than any machine resolves."""
 INITIAL_SHEAR_MODULUS = "initial shear modulus"
 EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
@@ -342,7 +339,7 @@ def _check_comparable(trees: Mapping[str, Any]) -> None:
             raise InputError(f"'{names[0]}' and '{name}' are fits of different loading modes.")
         for group, variable in (("observed_data", "stress"), ("constant_data", "stretch")):
             values, other_values = (_plain(tree[group][variable]) for tree in (first_tree, trees[name]))
-            if not agree(values, other_values, ROUNDING):
+            if not agree(values, other_values, FOUR_DIGITS):
                 raise InputError(
                     f"'{names[0]}' and '{name}' are fits of different measurements: compare fits of the same ones."
                 )

@@ -13,7 +13,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["LARGE_STRETCH", "agree", "check_no_percent", "checked", "checked_points", "in_mpa"]
+__all__ = ["FOUR_DIGITS", "LARGE_STRETCH", "agree", "check_no_percent", "checked", "checked_points", "in_mpa"]
 
 FloatArray = NDArray[np.float64]
 
@@ -23,6 +23,8 @@ LEAST_PERCENT = 30.0
 """Beginning of a range of stretches or amounts of shear from which percent are meant."""
 CONVERSION_ERROR = 1e-9
 """Largest difference, as a share of the largest value, between the same measurements converted from two units."""
+FOUR_DIGITS = 5e-4
+"""That between the same measurements in files of other digits: rounding to four, less than any machine resolves."""
 
 
 def agree(values: FloatArray, others: FloatArray, share: float = CONVERSION_ERROR) -> bool:

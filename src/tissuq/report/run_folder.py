@@ -19,7 +19,7 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
-from tissuq.studies.settings import RECIPE
+from tissuq.studies.settings import INPUT, RECIPE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -45,9 +45,6 @@ __all__ = [
     "write_page",
     "write_recipe",
 ]
-
-INPUT = "input"
-"""The folder of a run that holds copies of the user's files, so that the run can be repeated."""
 
 ASSESSMENT = "assessment.json"
 """The file with the assessment of each discrepancy."""

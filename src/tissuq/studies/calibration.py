@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -15,6 +16,7 @@ from tissuq.emulation import Calibration, Forward
 from tissuq.emulation.material_posterior import check_material
 from tissuq.emulation.problem import symbol_of
 from tissuq.errors import InputError
+from tissuq.experiments.checked_arrays import FOUR_DIGITS, agree
 from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.headings import heading, plain
 from tissuq.experiments.reading.recognition import ColumnChoice
@@ -27,11 +29,16 @@ from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
+from tissuq.studies.earlier_run import load_law, priors_of_run
+from tissuq.studies.settings import INPUT
 from tissuq.studies.stream import Step, silent
 
 __all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
 
 FloatArray = NDArray[np.float64]
+
+PROPORTIONAL_BY_CHANCE = 4
+"""Fewest measurements of which it shows that they are those of another file in another unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +123,8 @@ def run_calibration(
     if settings.material is not None:
         check_material(settings.material, settings.parameter_priors, settings.unit)
     data, experiments = _read(settings, folder)
+    if prior_run is not None:
+        _check_other_measurements(settings, data, folder / prior_run)
     units = {name: measured.units for name, measured in data.items()}
     if settings.material is not None and not settings.models:
         _check_unit(settings, [measured for _, measured in units.values()])
@@ -144,8 +153,6 @@ def run_calibration(
 
 def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> CalibrationSettings:
     """Return settings in which the posterior of a run stands as priors; what is stated of a parameter stays."""
-    from tissuq.studies.earlier_run import priors_of_run
-
     if settings.prior_run is None:
         return settings
     priors, correlations = priors_of_run(folder / settings.prior_run, str(settings.material), settings.unit)
@@ -157,6 +164,42 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
         "prior_run": None,
     }
     return settings.model_copy(update=changes)
+
+
+def _check_other_measurements(settings: CalibrationSettings, data: Mapping[str, Measured], run: Path) -> None:
+    """Refuse the posterior of measurements as the prior beside them, whatever their file is called and in any unit."""
+    for name, measured in data.items():
+        fitted = [*_stresses_of(run, str(settings.material)), *_columns_of_inputs(settings, measured, run)]
+        if any(_are_proportional(values, measured.measured) for values in fitted):
+            raise InputError(
+                f"the run '{run}' was fitted to the measurements{f' of {name}' * bool(name)} that are calibrated "
+                f"({measured.measured_label}), which would count twice: give a run of other tests (--prior-run), or "
+                "the priors themselves, as --prior C10=uniform(0.1, 5)."
+            )
+
+
+def _stresses_of(run: Path, material: str) -> Iterator[FloatArray]:
+    """Yield the stresses to which a run was fitted."""
+    for curve in load_law(run, material).model.experiment.curves:
+        yield curve.stress
+
+
+def _columns_of_inputs(settings: CalibrationSettings, measured: Measured, run: Path) -> Iterator[FloatArray]:
+    """Yield the columns of that name in the run's copies of measured files, of which a fit may have used some rows."""
+    folder = (run if run.is_dir() else run.parent.parent) / INPUT
+    for file in sorted(path for path in folder.glob("*") if path.is_file()):
+        with suppress(InputError):
+            table = _table(file, settings)
+            for column, quantity in enumerate(table.quantities):
+                if quantity == heading(measured.measured_label).quantity:
+                    yield table.without_missing([column]).numbers([column])[0][:: settings.every]
+
+
+def _are_proportional(values: FloatArray, others: FloatArray) -> bool:
+    """Return whether values are others in another unit or over another area; of a few, any may be by chance."""
+    if values.shape != others.shape or len(values) < PROPORTIONAL_BY_CHANCE or not values.any():
+        return False
+    return agree(others, values * (values @ others / (values @ values)), FOUR_DIGITS)
 
 
 def _check_unit(settings: CalibrationSettings, measured: Sequence[str]) -> None:

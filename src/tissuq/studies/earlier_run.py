@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenSettings
 
 __all__ = [
-    "POSTERIORS", "answering", "load", "load_run", "load_without_discrepancy", "modes_of", "posteriors_in", "priors_of",
-    "priors_of_run", "recipe_of",
+    "POSTERIORS", "answering", "load", "load_law", "load_run", "load_without_discrepancy", "modes_of", "posteriors_in",
+    "priors_of", "priors_of_run", "recipe_of",
 ]  # fmt: skip
 
 POSTERIORS = "posterior"
@@ -205,7 +205,18 @@ def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior]
     Raises
     ------
     InputError
-        When there is no such run, or it is of another law, or its posterior has no such form.
+        As `load_law`, or when its posterior has no such form.
+    """
+    return priors_of(load_law(run, material), unit)
+
+
+def load_law(run: Path, material: str) -> Posterior:
+    """Return the posterior of a law from a run, or from the file of one.
+
+    Raises
+    ------
+    InputError
+        When there is no such run, or it is of another law or has several posteriors of this one.
     """
     law = material_named(material)
     files = posteriors_in(run) if run.is_dir() else {}
@@ -217,7 +228,7 @@ def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior]
     posterior = load(run, law.name if law.name in files else None)
     if law.name != posterior.model.material.name:
         raise _of_other_materials(run, [posterior.model.material.name], law)
-    return priors_of(posterior, unit)
+    return posterior
 
 
 def _of_other_materials(run: Path, names: list[str], law: Material) -> InputError:

@@ -18,12 +18,14 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 __all__ = [
-    "DAMAGE", "RECIPE", "SizesOfErrors", "damage_reported", "is_inside", "load_settings", "looked_up",
+    "DAMAGE", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "is_inside", "load_settings", "looked_up",
     "positive_or_unknown", "setting_of", "there_is",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
+INPUT = "input"
+"""The folder of a run that holds copies of the user's files, so that the run can be repeated."""
 
 DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
 """What readers of damaged files raise: no TOML, JSON or UTF-8, values of other kinds, endless nesting."""
