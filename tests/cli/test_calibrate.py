@@ -213,6 +213,16 @@ def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the
     assert "kPa, 95 % interval" in said.out
 
 
+@pytest.mark.parametrize(("unit", "status"), [("mmHg", 2), ("MPa", 0)])
+def test_pressures_in_another_unit_than_the_law_are_refused(cli, here, unit, status):
+    (here / "cube.py").write_text(PUNCH)
+    (here / "cube.csv").write_text(f"depth,pressure ({unit})\n0.1,1.01\n0.2,2.3\n0.3,4.0\n")
+    usual = ["calibrate", "cube.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
+    said = cli(*usual, "--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2")
+    assert said.status == status, said.err
+    assert ("--unit mmHg or --unit MPa" in " ".join(said.err.split())) == bool(status)
+
+
 def test_of_columns_of_one_name_the_number_is_asked_for(cli, here):
     write_all(here)
     (here / "two.csv").write_text("depth,force,depth,force\n0.1,1,0.1,2\n0.2,2,0.2,4\n")

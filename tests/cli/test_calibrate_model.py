@@ -323,6 +323,8 @@ def test_a_run_is_repeated_from_its_own_folder_when_its_command_is_named(cli, he
         ({"TISSUE": "Muscle"}, [], ["no material 'Muscle'", "Tissue, Fat"], 0),
         ({"force=RF2@TOP": "force=RF9@TOP"}, [], ["not a quantity"], 0),
         ({"force=RF2@TOP": "force=RF2@BASE"}, [], ["RF2@BASE:sum is not in the results"], 1),
+        ({"force=RF2@TOP": "force=own.py:top", "kPa": "MPa"}, [], ["in mN, and the model is in N", "force=1000 if"], 0),
+        ({"force=RF2@TOP": "force=own.py:top", "kPa": "MPa"}, ["--factor", "force=1"], ["there is no file"], 0),
         ({"neo-hookean": "yeoh"}, [], ["calibrated without C20"], 0),
         ({}, ["--factor", "depth=-1"], ["factors are of force"], 0),
         ({}, ["--qoi", "more=RF1@TOP"], ["--noise-sd force=SD,more=SD"], 0),

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from tissuq.experiments.units import FORCE, LENGTH, PRESSURE
 from tissuq.export import CardFormat, Cards, CardSettings, FECode, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
 
-__all__ = ["DeckForward", "conversion", "units_of"]
+__all__ = ["DeckForward", "check_unit_of_function", "conversion", "units_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -327,3 +328,32 @@ def conversion(text: str, cards: CardSettings, unit: str) -> float:
             f"heading of the column, as in {kind.name} [{units_of(cards)[kind.name]}]."
         )
     return kind.factor(units_of(cards)[kind.name]) / kind.factor(unit)
+
+
+def check_unit_of_function(name: str, text: str, cards: CardSettings, unit: str) -> None:
+    """Refuse to compare what a function of the user gives with measurements that are not in the units of the model.
+
+    Parameters
+    ----------
+    name, text : str
+        Of the quantity.
+    cards : CardSettings
+        With the unit of stress of the model.
+    unit : str
+        That of the file; of one that says nothing nothing is refused.
+
+    Raises
+    ------
+    InputError
+        When both are units of one kind, and not the same.
+    """
+    if isinstance(parse_quantity(name, text), Component):
+        return  # `conversion` converts it
+    for kind in PHYSICAL.values():
+        of_file, of_model = kind.factor_or_none(unit), units_of(cards)[kind.name]
+        ratio = kind.factor(of_model) / of_file if of_file else 1.0
+        if not isclose(ratio, 1.0, rel_tol=1e-9):
+            raise InputError(
+                f"the {kind.name} '{name}' is measured in {unit}, and the model is in {of_model}: say in which of them "
+                f"{text} gives it, --factor {name}={ratio:.6g} if in {of_model}, or --factor {name}=1 if in {unit}."
+            )

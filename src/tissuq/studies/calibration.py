@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isclose
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -23,7 +24,7 @@ from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, check_one_specimen, only_rows
 from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
-from tissuq.experiments.units import measured_in, stress_unit
+from tissuq.experiments.units import PRESSURE, measured_in, stress_unit
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
@@ -39,6 +40,8 @@ FloatArray = NDArray[np.float64]
 
 PROPORTIONAL_BY_CHANCE = 4
 """Fewest measurements of which it shows that they are those of another file in another unit."""
+SAME_UNIT = 1e-9
+"""Relative difference of factors of one unit under two names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,11 +206,12 @@ def _are_proportional(values: FloatArray, others: FloatArray) -> bool:
 
 
 def _check_unit(settings: CalibrationSettings, measured: Sequence[str]) -> None:
-    """Refuse measured stresses in another unit than the law, unless the user says that the model is in this one."""
+    """Refuse measured stresses or pressures in another unit than the law, unless the user says that of the model."""
     if "unit" in settings.model_fields_set:
         return
     for unit in measured:
-        if measured_in(unit) == "stress" and stress_unit(unit).to_mpa != stress_unit(settings.unit).to_mpa:
+        factor = PRESSURE.factor_or_none(unit) if measured_in(unit) in ("stress", PRESSURE.name) else None
+        if factor is not None and not isclose(factor, stress_unit(settings.unit).to_mpa, rel_tol=SAME_UNIT):
             raise InputError(
                 f"the measured values are in {unit}, and the parameters of {settings.material} would be taken in "
                 f"{settings.unit}: say in which unit of stress the model computes, --unit {unit} or --unit "

@@ -290,7 +290,7 @@ class CalibrationSettings(ModelSettings):
     ) -> DeckForward:
         from tissuq.decks.quantity import located
         from tissuq.emulation import DeckForward
-        from tissuq.emulation.deck_forward import conversion
+        from tissuq.emulation.deck_forward import check_unit_of_function, conversion
         from tissuq.errors import InputError
         from tissuq.experiments.units import LENGTH
 
@@ -304,6 +304,10 @@ class CalibrationSettings(ModelSettings):
         }
         is_one, control_unit = len(quantities) == 1, units.get(of_model.names[0], ("", ""))[0]
         controlled, along = of_model.controlled, self.along.get(of_model.controlled)
+        compared = [(named[key], text, units.get(key, ("", ""))[1]) for key, text in texts.items()]
+        for name, text, unit in [*compared, *([(controlled, along, control_unit)] if along else [])]:
+            if name not in self.factors:
+                check_unit_of_function(name, text, cards, unit)
         if along is None and LENGTH.factor_or_none(control_unit):
             raise InputError(
                 f"the controls of the file are lengths ({control_unit}), and would be compared with the time of the "
