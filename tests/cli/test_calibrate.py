@@ -22,6 +22,10 @@ def force(parameters, depth):
 
 def wrong(parameters):
     return [1.0, 2.0]
+
+
+def failing(parameters, depth):
+    raise RuntimeError("no licence")
 """
 PRIORS = ["--prior", "mu=uniform(0.2,3)", "--prior", "b=uniform(0.5,6)"]
 USUAL = [*PRIORS, "--noise-sd", 0.02, "--runs", 16]
@@ -135,6 +139,7 @@ def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate
         (["punch.csv", "--forward", "force.py:force", "--runs", 8], "give the --prior of every parameter"),
         (["punch.csv", "--forward", "force.py:force", *PRIORS, "--runs", 2], "runs or more, and 2 are requested"),
         (["punch.csv", "--forward", "force.py:wrong", *USUAL], "shape (2,)"),
+        (["punch.csv", "--forward", "force.py:failing", *USUAL, "--out", "runs/punch"], "no licence"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "depth"], "name the column of the control"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "x", "--measured", "2"], "no column 'x'"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "2", "--measured", "2"], "the same column"),

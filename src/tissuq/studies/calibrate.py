@@ -260,8 +260,9 @@ def _open(folder: Path, model: Forward, problem: Problem) -> None:
 
 
 def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:
-    """Remove a folder in which not one run has ended, and what was made to hold it."""
-    if any(path.stat().st_size for path in folder.glob(f"batch-*/{RESULTS}")):
+    """Remove a folder without a run that succeeded or what a solver wrote of one, and what was made to hold it."""
+    has_written = any(path.name != ABOUT and not path.match("batch-*") for path in folder.glob("*"))
+    if any(not _has_failed(result) for result in _results(folder)) or (has_written and any(_results(folder))):
         return
     shutil.rmtree(folder, ignore_errors=True)
     for parent in missing[1:]:
@@ -270,8 +271,14 @@ def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:
 
 
 def _have_all_failed(folder: Path) -> bool:
-    results = [result for path in folder.glob(f"batch-*/{RESULTS}") for result in read_results(path).values()]
+    results = list(_results(folder))
     return bool(results) and all(map(_has_failed, results))
+
+
+def _results(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield what is recorded of the runs in a folder."""
+    for path in folder.glob(f"batch-*/{RESULTS}"):
+        yield from read_results(path).values()
 
 
 def _has_failed(result: dict[str, Any]) -> bool:
