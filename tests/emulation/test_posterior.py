@@ -420,6 +420,17 @@ def test_scores_of_heavy_tails_are_finite_parameters(prior):
     assert values[2] == pytest.approx(prior.quantile(0.5))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_posterior_like_its_prior_is_not_beyond_the_runs_that_lie_as_it_does(seed):
+    """Of 8 runs either end leaves out about a sixteenth of the prior, and of the posterior as much."""
+    data = neo_hooke({"C10": 2.0})
+    noise_sd = 0.2 * float(np.linalg.norm(neo_hooke({"C10": 1.0})))  # says as much as a prior with the sd 0.2, or 10 %
+    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.LogNormal(2.0, 0.05)}, noise_sd=noise_sd, runs=8, seed=seed)
+    draws, runs = found.draws(2000)[:, 0], found.runs.points
+    assert max(np.mean(draws < runs.min()), np.mean(draws > runs.max())) > 0.02
+    assert not any("beyond the runs" in text for text in found.warnings)
+
+
 @pytest.mark.slow
 def test_a_posterior_beyond_all_runs_is_told_as_such_and_not_as_the_bound_of_a_prior():
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)

@@ -34,7 +34,9 @@ MAX_RMS_STANDARDISED = 1.5
 """Largest root mean square of the standardised errors of an emulator that is not over-confident."""
 EDGE_WIDTH, MAX_EDGE_PROBABILITY = 0.01, 0.02
 """Width of an edge of the run plan, as a share of its own, and the largest posterior probability there without a
-warning."""
+warning; beyond the runs, by how much it may exceed that of the prior, from which few runs leave out its ends."""
+PRIOR_POINTS = 4096
+"""Equally probable values of a prior by which its probability beyond the runs is counted."""
 MIN_MISFIT_PROBABILITY = 1e-4
 """Probability of a misfit as large as that of the best parameters below which no parameters give the data."""
 MAX_SHARE_OUT_OF_REACH = 0.5
@@ -265,17 +267,19 @@ def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> flo
 
 
 def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[list[str], list[str]]:
-    """Return where the posterior is at bounds of priors, and where it is beyond all runs: parameters and which end."""
+    """Return where the posterior is at bounds of priors, and where more of it than of the prior is beyond all runs."""
     at_bounds: list[str] = []
     beyond_runs: list[str] = []
     for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
         prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
+        prior_values = np.asarray(prior.quantile((np.arange(PRIOR_POINTS) + 0.5) / PRIOR_POINTS))
         run_ends, signs = (float(column.min()), float(column.max())), (1.0, -1.0)
         edge = EDGE_WIDTH * (run_ends[1] - run_ends[0])
         for end, bound, run_end, sign in zip(("lower", "upper"), prior.support, run_ends, signs, strict=True):
             with np.errstate(divide="ignore", invalid="ignore"):
                 is_cut = np.isfinite(prior.log_density(bound))
             is_beyond = sign * (values - bound) < edge if is_cut else sign * (values - run_end) < 0
-            if posterior.weights[is_beyond].sum() > MAX_EDGE_PROBABILITY:
+            usual = 0.0 if is_cut else float((sign * (prior_values - run_end) < 0).mean())
+            if posterior.weights[is_beyond].sum() > usual + MAX_EDGE_PROBABILITY:
                 (at_bounds if is_cut else beyond_runs).append(f"{symbol} ({end})")
     return at_bounds, beyond_runs
