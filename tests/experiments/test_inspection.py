@@ -146,6 +146,18 @@ def test_by_how_much_the_peaks_of_equal_cycles_fall_is_said(inspected):
     assert "peaks" not in notes(inspected(growing, 1e3 * neo_hookean(growing)))
 
 
+@pytest.mark.parametrize(("stiffer", "is_unloaded"), [(1.4, False), (1.4, True), (1.0, False), (0.8, False)])
+def test_tests_beneath_one_another_may_be_of_several_specimens(inspected, stiffer, is_unloaded):
+    """Of cycles that were unloaded, and of curves that agree, nothing is said; one goes further than the other."""
+    ups = np.linspace(1, 1.3, 50), np.linspace(1, 1.25, 50)
+    way = [np.concatenate([up, up[::-1][1:]]) if is_unloaded else up for up in ups]
+    stress = np.concatenate([1e3 * neo_hookean(way[0]), 1e3 * stiffer * neo_hookean(way[1])])
+    text = notes(inspected(np.concatenate(way), stress))
+    assert "all 2 cycles are used" in text
+    is_said = "may be tests of several specimens: then name the specimen of every row in a column 'specimen'" in text
+    assert is_said == (stiffer != 1 and not is_unloaded)
+
+
 @pytest.mark.parametrize("repeats", [1, 2])
 def test_a_protocol_of_several_ratios_is_no_repetition(tmp_path, repeats):
     ratios = np.repeat([(1, 1), (1, 0.5), (0.5, 1)], repeats, axis=0)

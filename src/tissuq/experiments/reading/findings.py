@@ -18,10 +18,10 @@ from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.load_cell import scatter_of_neighbours
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
-from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
+from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests, jump
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.vocabulary import ROLES
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
 from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
@@ -118,7 +118,34 @@ def _cycles(reading: Reading, number: int) -> str:
     if share := _hysteresis_share(reading, number):
         seen += f", and {HYSTERESIS.format(share=share)}"
         advice = "to fit one branch of one cycle, give --cycle last --branch loading"
-    return f"{seen}; {'; '.join(filter(None, (advice, numbered)))}."
+    return f"{seen}; {'; '.join(filter(None, (advice, numbered or _several_specimens(reading, number))))}."
+
+
+def _several_specimens(reading: Reading, number: int) -> str:
+    """Return what else cycles may be whose unloading was not recorded, and whose stresses differ; nothing of others."""
+    course, cycles = reading.recorded.course, reading.cycles
+    labels = [cycle.label for cycle in cycles for _ in range(cycle.stop - cycle.start)]
+    are_named, are_all_used = CYCLE_NAMES & set(reading.table.quantities), len(reading.used_cycles) == len(cycles)
+    if are_named or not are_all_used or not jump(labels, course):
+        return ""
+    difference = _difference_of_cycles(reading, number)
+    if difference < NOTABLE_SHARE:
+        return ""
+    return (
+        f"as no unloading between them was recorded, and at one deformation their stresses differ by up to "
+        f"{difference:.0%} of the largest, they may be tests of several specimens: then name the specimen of every row "
+        "in a column 'specimen', or write a file for each"
+    )
+
+
+def _difference_of_cycles(reading: Reading, number: int) -> float:
+    """Return by how much the stresses of cycles differ as far as all of them go, over the largest stress."""
+    course, stress = reading.recorded.course, reading.recorded.stress[number]
+    way = np.abs(course - course[0])
+    loadings = [rows[np.argsort(way[rows])] for rows in (cycle.rows("loading") for cycle in reading.cycles)]
+    reach = min(float(way[rows].max()) for rows in loadings)
+    reached = [float(np.interp(reach, way[rows], stress[rows])) for rows in loadings]
+    return float(np.ptp(reached) / max(float(np.abs(stress).max()), np.finfo(float).tiny))
 
 
 def _change_of_peaks(reading: Reading, number: int) -> str:

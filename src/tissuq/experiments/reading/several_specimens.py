@@ -21,6 +21,7 @@ __all__ = [
     "SeveralSpecimens",
     "advice_on_numbered_tests",
     "check_one_specimen",
+    "jump",
     "only_rows",
     "row_names",
     "specimen_of",
@@ -106,7 +107,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 
     for column, labels in sorted(_parting_columns(table, choices, course), key=last):
         quantity = table.quantities[column]
-        is_numbered = not NOT_OF_TESTS.search(quantity) and _jump(labels, course)
+        is_numbered = not NOT_OF_TESTS.search(quantity) and jump(labels, course)
         if not (is_of_specimens(quantity) or not any(map(NUMBER.fullmatch, labels)) or is_numbered):
             continue
         name, distinct = table.key(column), list(dict.fromkeys(labels))
@@ -170,7 +171,7 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
     return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
 
 
-def _jump(labels: Sequence[str], course: Column) -> bool:
+def jump(labels: Sequence[str], course: Column) -> bool:
     """Tell whether the way back between labels was not measured, as it is between cycles of one specimen."""
     last = np.flatnonzero([label != next_label for label, next_label in pairwise(labels)])
     return bool((np.abs(course[last] - course[last + 1]) >= RETURN * np.ptp(course)).all())
