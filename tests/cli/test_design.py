@@ -60,6 +60,7 @@ def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
         (["run", "--discrepancy", "auto"], "no discrepancy 'auto'"),
         (["run", "--out", "run", "--force"], "is the run itself or contains it"),
         (["run", "--out", "run/inside"], "lies inside the run"),
+        (["run", "--target", "ensemble:nowhere:force"], "no complete ensemble in 'nowhere'"),
         (["run", "--candidate", "planar 1:1.2 9", "--points", "10"], "a candidate states its own points"),
     ],
 )
@@ -69,6 +70,7 @@ def test_what_cannot_be_used_is_told_and_leaves_nothing(cli, run, here, argument
     assert said.status == 2
     assert words in said.err
     assert "Traceback" not in said.err
+    assert str(here) not in said.err  # paths are as typed
     assert tree(here) == before
 
 

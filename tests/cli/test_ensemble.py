@@ -189,9 +189,11 @@ def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, m
     assert text.count("*HYPERELASTIC") == 2
 
 
-def test_a_dry_run_of_a_recipe_runs_no_function(cli, here, model):
+def test_a_function_is_named_as_typed_and_a_dry_run_of_a_recipe_does_not_run_it(cli, here, model):
     (here / "mine.py").write_text("def size(folder):\n    return 1\n")
     assert cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size").status == 0
+    page = (here / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<p>mine.py:size, in the units of the model" in page  # as typed
     copy = here / "out" / "quantities" / "mine.py"
     copy.write_text(f"open({str(here / 'ran')!r}, 'w')\n" + copy.read_text())
     said = cli("ensemble", "--config", "out/run.toml", "--dry-run")

@@ -33,10 +33,15 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     stated = call.stated.get("run")
     if not (call.config or stated):
         raise InputError("give the RUN folder of a fit, or --config run.toml.")
-    typed = tuple(with_folder(name, os.path.abspath) for name in call.stated.get("targets", ()))
-    settings = call.loaded(run=str(Path(stated).absolute()) if stated else None, targets=typed or None)
+
+    def beside_settings(name: str) -> str:  # where all names of the settings count from
+        is_from_here = not call.config or Path(name).is_absolute()
+        return str(name) if is_from_here else os.path.relpath(name, call.beside)
+
+    typed = tuple(with_folder(name, beside_settings) for name in call.stated.get("targets", ()))
+    settings = call.loaded(run=beside_settings(stated) if stated else None, targets=typed or None)
     run = (call.beside / settings.run).resolve()
-    target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
+    target = call.target(Path("runs") / f"{run.name}-design", apart_from=call.beside / settings.run)
 
     def from_target(name: str) -> str:
         return os.path.relpath((call.beside / name).resolve(), target.resolve())

@@ -342,7 +342,9 @@ def _quantity(study: EnsembleStudy, name: str, table: pd.DataFrame, headers: lis
     is_shared = bool(shares_in(table, is_shared=study.result.is_shared))
     picked = full.iloc[np.unique(np.linspace(0, len(full) - 1, ROWS).round().astype(int))]
     rows = [_row(study, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")]
-    text = next(quantity.text for quantity in study.prepared.quantities if quantity.name == name)
+    quantity = next(quantity for quantity in study.prepared.quantities if quantity.name == name)
+    is_function = isinstance(quantity, FunctionQuantity)  # whose file is known by its absolute name
+    text = study.prepared.settings.quantities[name] if is_function else quantity.text
     shares = " Right: shares of the variance, ± one standard error (bootstrap)." * is_shared
     figure = Picture(
         f"quantity-{name}",
