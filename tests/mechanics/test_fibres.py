@@ -142,6 +142,7 @@ def test_a_uniaxial_test_along_the_fibres_is_that_of_a_symmetric_material():
 )
 def test_the_laws_of_the_literature_are_sums(name, parts):
     assert material_named(name) == material_named(parts)
+    assert material_named(parts).name == (parts if "rivlin" in parts else name)
 
 
 def test_a_name_tells_families_and_a_known_angle_and_is_the_materials_own():

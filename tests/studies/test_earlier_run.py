@@ -103,3 +103,30 @@ def test_a_run_that_names_a_file_outside_of_its_folder_is_refused(run, tmp_path,
     recipe.write_text(recipe.read_text().replace("input/specimen.csv", outside))
     with pytest.raises(tq.InputError, match=f"names the file '{outside}', which does not lie in the folder"):
         load_without_discrepancy(run)
+
+
+def test_a_sum_has_its_name_in_the_literature_however_it_is_typed(tmp_path):
+    stretch = np.linspace(1.02, 1.2, 8)
+    symbols = [parameter.symbol for parameter in tq.mechanics.material_named("standard-reinforcing").parameters]
+    truth = dict(zip(symbols, (0.02, 0.05, 0.6), strict=True))
+    data = tq.simulate("standard-reinforcing", truth, np.column_stack([stretch, stretch]), mode="biaxial",
+                       noise_sd=1e-4, seed=1)  # fmt: skip
+    columns = np.column_stack([data.stretch, data.stress])
+    header = "stretch_x,stretch_y,stress_x (MPa),stress_y (MPa)"
+    np.savetxt(tmp_path / "sheet.csv", columns, delimiter=",", header=header, comments="")
+    settings = SpecimenSettings(
+        file=str(tmp_path / "sheet.csv"),
+        mode="biaxial",
+        material="neo-hookean+standard-fibres",
+        discrepancies=("none",),
+    )
+    result = specimen_result(run_specimen(settings), [tmp_path / "sheet.csv"])
+    assert result.title == "sheet: standard-reinforcing"
+    (tmp_path / "run").mkdir()
+    write_result(result, tmp_path / "run", figures=False)
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").partition("material = ")[0]
+    assert "neo-hookean+standard-fibres" not in page
+    for name in ("standard-reinforcing", "neo-hookean+standard-fibres"):
+        assert tq.load(tmp_path / "run", material=name).model.material.name == "standard-reinforcing"
+    with pytest.raises(tq.InputError, match="is of the material 'standard-reinforcing', and not of 'yeoh'"):
+        tq.load(tmp_path / "run", material="yeoh")

@@ -15,7 +15,14 @@ from tissuq.experiments.modes import Deformation
 from tissuq.parameters.parameter import Parameter
 from tissuq.registry import variants
 
-__all__ = ["Material", "MaterialSum", "StretchMaterial", "materials"]
+__all__ = ["SUMS", "Material", "MaterialSum", "StretchMaterial", "materials"]
+
+SUMS = {
+    "standard-reinforcing": "neo-hookean+standard-fibres",
+    "holzapfel-gasser-ogden": "neo-hookean+exponential-fibres",
+    "gasser-ogden-holzapfel": "neo-hookean+dispersed-fibres",
+}
+"""Sums that have a name in the literature, which is theirs everywhere."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +121,9 @@ class MaterialSum(Material):
 
     @property
     def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """The names of its summands, joined."""
-        return "+".join(material.name for material in self.summands)
+        """The names of its summands, joined; of a sum that has a name in the literature, that name."""
+        joined = "+".join(material.name for material in self.summands)
+        return next((name for name, summands in SUMS.items() if summands == joined), joined)
 
     @property
     def formula(self) -> str:  # type: ignore[override]

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from tissuq.errors import ModelError
+from tissuq.errors import InputError, ModelError
 from tissuq.mechanics.laws.fibres import FibreMaterial
 from tissuq.mechanics.laws.polynomial import Rivlin
 from tissuq.mechanics.laws.separable import Ogden
-from tissuq.mechanics.material import Material, MaterialSum
+from tissuq.mechanics.material import SUMS, Material, MaterialSum
 from tissuq.mechanics.user_law import UserCode, as_material, load_material
 from tissuq.registry import find, load_plugins, variants
 
-__all__ = ["FORMS", "material_named", "plugins"]
+__all__ = ["FORMS", "material_named", "plugins", "standard_name"]
 
 FAMILIES = Rivlin, Ogden, FibreMaterial
-SUMS = {
-    "standard-reinforcing": "neo-hookean+standard-fibres",
-    "holzapfel-gasser-ogden": "neo-hookean+exponential-fibres",
-    "gasser-ogden-holzapfel": "neo-hookean+dispersed-fibres",
-}
-"""Sums that have a name in the literature."""
 FORMS = (
     *(family.form for family in FAMILIES),
     *(f"{name} ({summands})" for name, summands in SUMS.items()),
@@ -54,6 +48,20 @@ def material_named(material: str | Material, *, laws: bool = False) -> Material:
     names = [SUMS.get(name.strip(), name) for name in material.split("+")]
     summands = [_single(name.strip(), laws) for name in "+".join(names).split("+")]
     return MaterialSum.of(*summands) if len(summands) > 1 else summands[0]
+
+
+def standard_name(name: str) -> str:
+    """Return the name under which runs have the material of that name; another text as it is.
+
+    Examples
+    --------
+    >>> standard_name("neo-hookean+exponential-fibres"), standard_name("rivlin:C20,C10"), standard_name("auto")
+    ('holzapfel-gasser-ogden', 'rivlin:C10,C20', 'auto')
+    """
+    try:
+        return material_named(name).name
+    except (ModelError, InputError):
+        return name
 
 
 def _single(name: str, laws: bool) -> Material:

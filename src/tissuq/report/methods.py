@@ -36,7 +36,7 @@ def methods_section(study: SpecimenStudy) -> Section:
     posterior, unit, tests = study.posteriors[study.main], study.unit, study.experiment.tests
     material, diagnostics = posterior.model.material, posterior.diagnostics
     introduction = INTRODUCTION.format(
-        material=study.settings.material,
+        material=material.name,
         formula=material.formula,
         source=material.source,
         version=version("tissuq"),

@@ -112,7 +112,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     modes = ", ".join(mode.name for mode in study.modes)
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
-        title=f"{settings.material} parameters of a population of {count} specimens",
+        title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),

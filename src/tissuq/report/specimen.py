@@ -59,7 +59,7 @@ def specimen_answer(study: SpecimenStudy) -> Result:
     answer, unit = study.answer, study.unit
     return Result(
         command="fit",
-        title=f"{named(study.experiment)}: {study.settings.material}",
+        title=f"{named(study.experiment)}: {study.posteriors[study.main].model.material.name}",
         subject=f"{subject_of(study.experiment)} · discrepancy {study.main}",
         numbers=tuple(
             Number(name, mean / unit.to_mpa, low / unit.to_mpa, high / unit.to_mpa, unit.name)
@@ -135,7 +135,8 @@ def _tables(study: SpecimenStudy, summary: list[Row]) -> tuple[Table, ...]:
 
 
 def _summary_table(study: SpecimenStudy, summary: list[Row]) -> Table:
-    title = f"{study.experiment.name}: {study.settings.material} with model uncertainty"
+    law = study.posteriors[study.main].model.material.name
+    title = f"{study.experiment.name}: {law} with model uncertainty"
     return summary_table(summary, study.unit, title, study.main)
 
 

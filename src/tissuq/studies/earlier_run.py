@@ -11,7 +11,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.units import stress_unit
-from tissuq.mechanics import Material, material_named
+from tissuq.mechanics import Material, material_named, standard_name
 from tissuq.model.discrepancy import Auto, Discrepancy, NoDiscrepancy
 from tissuq.parameters.priors import LogNormal, Normal, Prior
 from tissuq.posterior.archive import read_modes
@@ -66,7 +66,7 @@ def load(
     file, law = Path(path), material if isinstance(material, Material) else None
     user_discrepancy = discrepancy if isinstance(discrepancy, Discrepancy) else None
     posterior = Posterior.load(file if file.is_file() else _file_in(file, discrepancy, material), law, user_discrepancy)
-    if isinstance(material, str) and material != posterior.model.material.name:
+    if isinstance(material, str) and standard_name(material) != posterior.model.material.name:
         raise InputError(f"'{path}' is of the material '{posterior.model.material.name}', and not of '{material}'.")
     return posterior
 
@@ -173,9 +173,11 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None, material: str | M
     A law is also chosen by the name that is given for the discrepancy, as it was before it had an option of its own.
     """
     files, is_of_laws = posteriors_in(run), _compares_laws(run)
+    if is_of_laws:  # those that were written before a sum had one name
+        files = {standard_name(name): file for name, file in files.items()}
     names = list(files)
     name = discrepancy.name if isinstance(discrepancy, Discrepancy) else discrepancy
-    law = material.name if isinstance(material, Material) else material
+    law = material.name if isinstance(material, Material) else standard_name(material) if material else None
     if is_of_laws and law and name not in (None, law, *recipe_of(run).discrepancies):
         raise InputError(
             f"run '{run}' has no discrepancy '{name}': its laws are with {recipe_of(run).discrepancies[0]}."
