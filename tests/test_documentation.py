@@ -174,6 +174,17 @@ def test_every_tutorial_runs_code():
     assert all(execution.has_code(page.read_text(encoding="utf-8")) for page in [*tutorials, DOCS / "start.md"])
 
 
+def test_percentages_are_written_with_a_space():
+    """``{share:.0%}`` writes them without; options that are typed, such as ``stress=10%``, have none."""
+    sources = [*(ROOT / "src" / "tissuq").rglob("*.py"), *(ROOT / "docs").glob("*.md")]
+    without = [
+        f"{path.name}: {found}"
+        for path in sources
+        for found in re.findall(r"[^{}]{0,30}:[+#]?\.?\d*%\}|\| *\d+%[^|]*\|", path.read_text(encoding="utf-8"))
+    ]
+    assert without == []
+
+
 def test_a_number_stays_with_its_unit_in_tables_alone():
     text = "| 95 % | 1.2 ± 0.3 kPa | a b |\n\n95 % of it\n"
     assert formulas.with_whole_numbers(text) == "| 95\u00a0% | 1.2\u00a0±\u00a00.3\u00a0kPa | a b |\n\n95 % of it\n"

@@ -77,11 +77,11 @@ def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
     ("share", "words"),
     [
         ((0.03, 0.01, 0.05), ""),
-        ((0.1, 0.05, 0.15), "yeoh alone is off by 10% of the stress"),
-        ((0.4, 0.2, 0.6), "yeoh alone is wrong here: the discrepancy carries 40% of the stress (95 % interval 20% to"),
+        ((0.1, 0.05, 0.15), "yeoh alone is off by 10 % of the stress"),
+        ((0.4, 0.2, 0.6), "yeoh alone is wrong here: the discrepancy carries 40 % of the stress (95 % interval 20 %"),
         (
             (2.0, 1.4, 2.6),
-            "yeoh alone is wrong here: the discrepancy opposes it with 200% of the stress (95 % interval",
+            "yeoh alone is wrong here: the discrepancy opposes it with 200 % of the stress (95 % interval",
         ),
         ((0.9, 0.3, 1.5), "How much of the stress is yeoh's and how much the discrepancy's is not determined"),
     ],
@@ -281,9 +281,8 @@ def test_a_law_that_does_not_describe_the_measurements_is_said_to_be_wrong_with_
     posterior = gallery.fit(data, discrepancy="auto", noise_sd=0.01)
     mean, low, high = posterior.assess().share
     assert mean > PRECISE
-    assert f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})" in (
-        posterior.answer.law
-    )
+    ends = f"95 % interval {100 * low:.0f} % to {100 * high:.0f} %"
+    assert f"the discrepancy carries {100 * mean:.0f} % of the stress ({ends})" in posterior.answer.law
     right = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.01, seed=1)
     assert gallery.fit(right, discrepancy="auto", noise_sd=0.01).answer.law == ""
 

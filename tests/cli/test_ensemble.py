@@ -37,7 +37,7 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert [float(row["time"]) for row in halves] == [0.5, 1.0]
     assert float(halves[0]["mean"]) == pytest.approx(np.mean(constants) / 2, rel=1e-8)
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
-    assert "too few for a 95 % band" in page
+    assert "too few for a 95\u00a0% band" in page
     assert page.count("data:image/svg+xml") == 2
     assert "HYPERELASTIC, NEO HOOKE" in page
 

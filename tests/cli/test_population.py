@@ -294,7 +294,7 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
         "--new-patient",
         "age=80",
         "--aim",
-        "8%",
+        "8 %",
         *OPTIONS,
         "--no-figures",
     ]
@@ -312,7 +312,7 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
     assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
     assert needed["new patient"]["specimens"] == ""
-    assert "Specimens like these for ± 8%" in text
+    assert "Specimens like these for ± 8 %" in text
     assert "not reached: specimens differ more" in text
     patient = next(row for row in table(here / "run" / "population.csv") if row["quantity"] == "new patient")
     assert float(patient["median"]) == pytest.approx(

@@ -60,7 +60,7 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
     (use,) = json.loads((folder / "result.json").read_text(encoding="utf-8"))["uses"]
     assert use == of_fit | {"purpose": "use of the fit in finite elements"}
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert "too few for a 95 % band" in page
+    assert "too few for a 95\u00a0% band" in page
     assert "it takes more draws to tell them apart" in page
     assert "is taken out first" not in page
     assert page.count("data:image/svg+xml") == 4
@@ -183,7 +183,7 @@ def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others
     assert "4 draws were computed in full" in page
     assert "4 of 9 draws computed in full, the others to first order" in page
     assert "Corrected for the size of the cells, from a mesh of twice the fineness" in page
-    force, mean, sd = (f"{100 * error[name]:.2g} %" for name in ("force", "mean", "sd"))
+    force, mean, sd = (f"{100 * error[name]:.2g}\u00a0%" for name in ("force", "mean", "sd"))
     assert f"the error of such a force is {force} at the last step" in page
     assert f"that of the mean of all draws {mean}, and that of their sd {sd}." in page
 

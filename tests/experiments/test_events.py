@@ -128,7 +128,7 @@ def test_a_rupture_is_said_and_the_advice_leaves_it_out(inspected):
     (stretch, stress), more = up(), np.linspace(1.41, 1.6, 20)
     curve = np.concatenate([stretch, more]), np.concatenate([stress, np.full(20, 0.001)])
     (note,) = inspected(*curve).warnings
-    assert note.startswith("after line 61 (stretch 1.4) the stress falls by 97% of the largest while the test goes on")
+    assert note.startswith("after line 61 (stretch 1.4) the stress falls by 97 % of the largest while the test goes on")
     assert "--until-peak" in note
     inspection = inspected(*curve, until_peak=True)
     assert inspection.warnings == ()
@@ -155,7 +155,7 @@ def test_a_hold_is_said_and_the_advice_leaves_it_out(inspected):
     (stretch, stress), left = up(), 1 - 0.3 * -np.expm1(-np.linspace(0, 5, 41)[1:])
     curve = np.concatenate([stretch, np.full(40, 1.4)]), np.concatenate([stress, left * stress[-1]])
     (note,) = inspected(*curve).warnings
-    assert note.startswith("in lines 61:101 the stretch rests while the stress falls by up to 28% of the largest")
+    assert note.startswith("in lines 61:101 the stretch rests while the stress falls by up to 28 % of the largest")
     assert "--until-peak" in note
     inspection = inspected(*curve, until_peak=True)
     assert inspection.warnings == ()

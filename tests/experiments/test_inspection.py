@@ -76,7 +76,7 @@ def test_a_plain_curve_raises_no_doubt(inspected, tmp_path):
         (30 * curve()[0] - 29, curve()[1], "the largest stretch is 13"),
         (100 * curve()[0], curve()[1], "where these are in percent, write % in its heading, as in 'stretch (%)'"),
         (curve()[0] + 0.2, curve()[1], "begin at stretch 1.2, not near 1"),
-        (curve()[0], curve()[1] + 5, "at stretch 1 the stress is already 5 kPa, 12% of the largest"),
+        (curve()[0], curve()[1] + 5, "at stretch 1 the stress is already 5 kPa, 12 % of the largest"),
         (curve()[0], np.maximum(curve()[1] - 20, 0), "rows carry no load that shows, until the stretch is 1.19"),
         (*curve(rows=20_000), "all 20000 rows would be fitted; --every 20 would leave about a thousand"),
     ],
@@ -141,7 +141,7 @@ def test_by_how_much_the_peaks_of_equal_cycles_fall_is_said(inspected):
     number = np.cumsum(np.r_[False, (np.diff(stretch)[1:] > 0) & (np.diff(stretch)[:-1] <= 0), False])
     softer = np.select([number == 0, number == 1], [1.0, 0.9], 0.8)
     text = notes(inspected(stretch, 1e3 * neo_hookean(stretch) * softer))
-    assert "all 3 cycles are used, at whose peaks the stress falls by 20% of the largest from the first to the" in text
+    assert "all 3 cycles are used, at whose peaks the stress falls by 20 % of the largest from the first to the" in text
     growing, _ = cycles([1.2, 1.25, 1.3], rows=50)
     assert "peaks" not in notes(inspected(growing, 1e3 * neo_hookean(growing)))
 

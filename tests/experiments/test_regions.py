@@ -50,7 +50,7 @@ def test_the_data_sets_show_none_but_few_digits(name):
 def test_a_slip_is_said_with_its_lines_and_the_advice_keeps_what_came_before(inspected):
     stress = 10 * WAY - 0.5 * (WAY > 0.5)
     (note,) = inspected(1 + 0.3 * WAY, stress).warnings
-    assert note.startswith("in line 63 the stress suddenly falls, by up to 5.3% of the largest")
+    assert note.startswith("in line 63 the stress suddenly falls, by up to 5.3 % of the largest")
     inspection = inspected(1 + 0.3 * WAY, stress, leave_out=re.search(r"--leave-out (\S+)\.$", note)[1])
     assert inspection.warnings == ()
     assert inspection.reading.experiment.stretch.max() == pytest.approx(1.15)
@@ -133,7 +133,7 @@ def test_coarse_loads_are_said_with_their_step_and_enter_the_fit(inspected):
     stress = 0.25 * np.rint((10 * WAY + WAY**2) / 0.25)
     inspection = inspected(1 + 0.3 * WAY, stress)
     (note,) = inspection.warnings
-    assert note.startswith("the stresses are multiples of 0.25 kPa, 2.3% of the largest")
+    assert note.startswith("the stresses are multiples of 0.25 kPa, 2.3 % of the largest")
     least = inspection.reading.experiment.least_errors
     assert least == pytest.approx({"resolution": 0.25 / 11 / np.sqrt(12)})
     assert f"--tolerance resolution={least['resolution']:.2g}" in note
@@ -159,7 +159,7 @@ def test_a_zero_that_drifts_is_said_with_both_ends(inspected):
     drifting = 10 * way - np.linspace(0, 1, 201)
     note, hysteresis = inspected(1 + 0.3 * way, drifting).warnings
     assert hysteresis.startswith("loading and unloading differ")
-    assert "10% of the largest apart: the zero of the load cell drifts" in note
+    assert "10 % of the largest apart: the zero of the load cell drifts" in note
     assert "--branch loading" in note
     assert inspected(1 + 0.3 * way, drifting, branch="loading").warnings == ()
     assert find_drift(way, 10 * way) is None

@@ -31,7 +31,7 @@ def test_tests_are_ranked_for_every_target_with_the_data_again(posterior):
         np.testing.assert_allclose(own["reduction"], 1 - own["sd_after"] / own["sd_now"])
     far = table[table["candidate"] == "three"].iloc[0]
     assert far["beyond"] == pytest.approx(2 / 3)
-    assert far["note"] == "67% beyond the data"
+    assert far["note"] == "67 % beyond the data"
     assert (table["stable"] == 1).all()
 
 

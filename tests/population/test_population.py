@@ -469,7 +469,7 @@ def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_tha
         model = None
 
     clear = [(0.1, 0.0, 0.2), (0.4, 0.3, 0.5), (0.6, 0.4, 0.8)]
-    assert "demiray alone is wrong here: the discrepancy carries 40% of the stress" in said(clear)
+    assert "demiray alone is wrong here: the discrepancy carries 40 % of the stress" in said(clear)
     assert said(clear, [at_rest]) == ""
     assert said([(0.1, 0.0, 0.2)] * 2 + clear[2:]) == ""
     assert said([(0.9, 0.3, 1.5)] * 2 + clear[2:]) == ""

@@ -35,7 +35,7 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     best = study.table[study.table["target"] == "modulus"].iloc[0]
     assert rows[0][0] == best["candidate"]
     assert float(rows[0][1]) == pytest.approx(1000 * best["sd_after"], rel=0.005)
-    assert rows[0][2].startswith(f"{best['reduction']:.1%}")
+    assert rows[0][2].startswith(f"{100 * best['reduction']:.1f} %")
     assert heading(study, first).endswith("kPa now")
     assert "kPa" not in heading(study, second)
     assert rows[-1][1:3] == ["", ""]

@@ -150,7 +150,7 @@ def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(pos
     page = (tmp_path / "report.html").read_text()
     assert "engineering stress at stretch 1.2" in page
     assert re.search(
-        r"Extrapolated to stretch 9, .*, the engineering stress is not known at all \(95 %: .* to .*\)\.", page
+        r"Extrapolated to stretch 9, .*, the engineering stress is not known at all \(95\s%: .* to .*\)\.", page
     )
     assert "How the measurements are predicted" not in page
     assert "<img" not in page

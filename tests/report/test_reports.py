@@ -120,6 +120,12 @@ def test_every_table_has_rows_as_wide_as_its_heading(text):
         assert len({len(re.findall(r"<t[hd][ >]", row)) for row in rows}) == 1
 
 
+def test_a_percentage_is_spelled_in_one_way(text):
+    shown = re.sub(r"<(script|style|pre|code)\b.*?</\1>|<[^>]*>", " ", text, flags=re.DOTALL)
+    assert "95\u00a0%" in shown
+    assert re.findall(r".{30}\d ?%", shown) == []
+
+
 def test_the_page_asks_no_host_for_anything(text):
     page = Page(text)
     assert all(reference.startswith(("data:", "#")) for reference in page.references)
@@ -201,7 +207,7 @@ def test_the_summary_on_the_page_has_stability_in_the_modes_that_were_measured(s
     headers = re.findall(r'<th scope="col">(.*?)</th>', table)
     cells = re.findall(r"<td>(.*?)</td>", re.search(r"<tr class=main><td>auto</td>(.*?)</tr>", table, re.DOTALL)[1])
     probability = specimen_study.posteriors["auto"].stable_ranges["uniaxial"].probability
-    assert cells[headers.index("stable") - 1] == f"{probability:.0%}"
+    assert cells[headers.index("stable") - 1] == f"{100 * probability:.0f}\u00a0%"
 
 
 def test_a_page_without_figures_says_how_to_repeat_it_without(specimen_study, specimen_file, tmp_path):

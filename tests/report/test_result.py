@@ -239,3 +239,11 @@ def test_a_problem_stands_above_the_answer(capsys):
 def test_a_number_that_is_not_to_be_reported_does_not_stand_out(verdict, classes, tmp_path):
     write_result(result_of(uses=(Use("report it", verdict, "known to ± 90 %"),)), tmp_path, figures=False)
     assert f'<p class="{classes}">' in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_no_line_ends_before_the_sign_of_a_percentage(capsys):
+    for count in range(1, 40):
+        print_result(result_of(finding=f"{'x' * count} " + "it is 95 % of it " * 12).record())
+    lines = capsys.readouterr().out.splitlines()
+    assert any("95 %" in line for line in lines)
+    assert not any(line.lstrip().startswith("%") for line in lines)

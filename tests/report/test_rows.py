@@ -62,7 +62,7 @@ def test_a_summary_is_rounded_alike_in_the_unit_of_the_file():
     assert table.rows[0][:4] == ["none", "1235", "30", "[1175, 1294]"]
     table = summary_table([ROW], StressUnit("MPa", 1.0), "title")
     assert table.headers[4:] == ["truth", "log ev.", "in band", "alone"]
-    assert table.rows == [["none", "1.235", "0.030", "[1.175, 1.294]", "yes", "-12.35", "97%", "50%"]]
+    assert table.rows == [["none", "1.235", "0.030", "[1.175, 1.294]", "yes", "-12.35", "97 %", "50 %"]]
 
 
 def test_a_summary_has_columns_for_what_is_known_of_any_of_its_rows():
@@ -71,8 +71,8 @@ def test_a_summary_has_columns_for_what_is_known_of_any_of_its_rows():
     unknown = dict.fromkeys(("contains_truth", "rhat", "stable", "lost_at", "lost_at_low", "lost_at_high"))
     table = summary_table([sampled, ROW | unknown], StressUnit("MPa", 1.0), "title")
     assert table.headers[4:] == ["log ev.", "in band", "alone", "stable", "lost at stretch", "R-hat", "ESS"]
-    assert table.rows[0][4:] == ["", "97%", "50%", "85%", "0.925 [0.907, 0.932]", "1.001", "812"]
-    assert table.rows[1][4:] == ["-12.35", "97%", "50%", "", "", "", ""]
+    assert table.rows[0][4:] == ["", "97 %", "50 %", "85 %", "0.925 [0.907, 0.932]", "1.001", "812"]
+    assert table.rows[1][4:] == ["-12.35", "97 %", "50 %", "", "", "", ""]
     stable = sampled | {"lost_at": None, "lost_at_low": None, "lost_at_high": None}
     assert "lost at stretch" not in summary_table([stable], StressUnit("MPa", 1.0), "title").headers
 
@@ -90,7 +90,7 @@ def test_where_stability_is_lost_is_told_from_a_probability_of_5_percent():
     row |= {"lost_below_low": 0.9071, "lost_below_high": 0.932}
     row |= {"lost_above_probability": 0.05, "lost_above_median": 1.0, "lost_above_low": 1.0, "lost_above_high": 1.0}
     assert stability_section([row]).blocks[1].rows == [
-        ["auto", "uniaxial", "0.9 to 1.1", "85%", "0.925 [0.907, 0.932]", ""]
+        ["auto", "uniaxial", "0.9 to 1.1", "85 %", "0.925 [0.907, 0.932]", ""]
     ]
 
 

@@ -48,7 +48,7 @@ def test_an_other_specimen_is_told(run):
         DesignSettings(run="run", discrepancy="none", candidates=("planar 1.05:1.2 6",), specimen="other"), run
     )
     assert study.error == 0.18
-    assert any("differ by about 18%" in text for text in study.explanations)
+    assert any("differ by about 18 %" in text for text in study.explanations)
 
 
 def test_what_was_not_fitted_is_refused(run):

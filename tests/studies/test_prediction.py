@@ -104,7 +104,7 @@ def test_the_share_of_the_variance_beyond_the_data_is_that_of_the_errors_of_thei
     assert (found.extrapolated[0][1:] > 0.01).all()
     assert found.table["extrapolated"].tolist() == found.extrapolated[0].tolist()
     assert (
-        f"up to {expected.max():.0%} of the variance of the stress is due to how the energy goes on"
+        f"up to {100 * expected.max():.0f} % of the variance of the stress is due to how the energy goes on"
         in found.warnings[0]
     )
 

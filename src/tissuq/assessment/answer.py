@@ -125,16 +125,16 @@ def _law_in_words(solution: Solution, has_stress_at_rest: bool) -> str:
     if has_stress_at_rest:
         return f"There is stress at rest, so that it cannot be said how far {law} alone is off."
     if mean <= PRECISE:
-        return f"{law} alone is off by {mean:.0%} of the stress. {TOGETHER}"
+        return f"{law} alone is off by {100 * mean:.0f} % of the stress. {TOGETHER}"
     if high < 1:
         return (
-            f"{law} alone is wrong here: the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to "
-            f"{high:.0%}). {TOGETHER}"
+            f"{law} alone is wrong here: the discrepancy carries {100 * mean:.0f} % of the stress (95 % interval "
+            f"{100 * low:.0f} % to {100 * high:.0f} %). {TOGETHER}"
         )
     if low > 1:
         return (
-            f"{law} alone is wrong here: the discrepancy opposes it with {mean:.0%} of the stress (95 % interval "
-            f"{low:.0%} to {high:.0%}). {TOGETHER}"
+            f"{law} alone is wrong here: the discrepancy opposes it with {100 * mean:.0f} % of the stress (95 % "
+            f"interval {100 * low:.0f} % to {100 * high:.0f} %). {TOGETHER}"
         )
     return f"How much of the stress is {law}'s and how much the discrepancy's is not determined. {TOGETHER}"
 

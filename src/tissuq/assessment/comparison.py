@@ -103,7 +103,7 @@ class Average:
         return f"<p>{escape(repr(self))}</p>{self.summary().to_html(float_format='{:.4g}'.format)}"
 
     def __repr__(self) -> str:
-        return f"<Average of {', '.join(f'{name} {weight:.0%}' for name, weight in self.weights.items())}>"
+        return f"<Average of {', '.join(f'{name} {100 * weight:.0f} %' for name, weight in self.weights.items())}>"
 
     @property
     def _unit(self) -> StressUnit:

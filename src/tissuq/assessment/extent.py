@@ -141,8 +141,10 @@ class Assessment:
                 f"{_percent(self.probability_of_none)} (for information: that is no reason to drop the discrepancy)"
             )
         if len(self.members) > 1:
-            named = ", ".join(f"{name} {weight:.0%}" for name, weight in self.members.items() if weight >= 0.005)
-            clauses.append(f"the energies have the weights {named}; {self.between:.0%} of the variance is between them")
+            weights = {name: weight for name, weight in self.members.items() if weight >= 0.005}
+            named = ", ".join(f"{name} {100 * weight:.0f} %" for name, weight in weights.items())
+            between = f"{100 * self.between:.0f} % of the variance is between them"
+            clauses.append(f"the energies have the weights {named}; {between}")
         if self.direction is not None:
             clauses.append(
                 f"the stresses of the two axes tell of a preferred direction with a probability of "
@@ -157,7 +159,7 @@ class Assessment:
         if self.stable:
             clauses.append(self._stability())
         if self.factors:
-            named = ", ".join(f"{name} {factor - 1:+.0%}" for name, factor in self.factors.items())
+            named = ", ".join(f"{name} {100 * (factor - 1):+.0f} %" for name, factor in self.factors.items())
             clauses.append(f"the stresses of the tests differ from those of their common material by {named}")
         if self.power_scaling is not None:
             clauses.append(self.power_scaling.sentence(self.parameter))
@@ -173,16 +175,19 @@ class Assessment:
             )
             return
         if high < 1:
-            yield f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"
+            yield (
+                f"the discrepancy carries {100 * mean:.0f} % of the stress (95 % interval {100 * low:.0f} % to "
+                f"{100 * high:.0f} %)"
+            )
         elif low > 1:
             yield (
-                f"the discrepancy opposes the material: its stress is {mean:.0%} of that measured (95 % interval "
-                f"{low:.0%} to {high:.0%})"
+                f"the discrepancy opposes the material: its stress is {100 * mean:.0f} % of that measured (95 % "
+                f"interval {100 * low:.0f} % to {100 * high:.0f} %)"
             )
         else:
             yield (
                 "the data do not determine how much of the stress the discrepancy carries (95 % interval "
-                f"{low:.0%} to {high:.0%}: it may oppose the material)"
+                f"{100 * low:.0f} % to {100 * high:.0f} %: it may oppose the material)"
             )
         if max(map(abs, self.initial_share)) < NEGLIGIBLE_INITIAL_SHARE:
             yield f"it has no initial stiffness, so it takes none from {self.parameter}"
@@ -191,7 +196,10 @@ class Assessment:
         meaning = f"by which {self.parameter} may be off"
         if self.direction is not None and self.direction > PROBABLE_DIRECTION:
             meaning = "which along the axes of the tests is another than in the mean over all directions"
-        yield f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), {meaning}"
+        yield (
+            f"it carries {100 * mean:.0f} % of the initial stiffness (95 % interval {100 * low:.0f} % to "
+            f"{100 * high:.0f} %), {meaning}"
+        )
 
     def _stability(self) -> str:
         """Return the probability of stability over the measured range, in words."""
@@ -388,7 +396,7 @@ def _probability_of_none(solution: Solution, none: Solution | None) -> float | N
 def _percent(probability: float) -> str:
     if min(probability, 1 - probability) < 0.005:
         return "less than 1 %" if probability < 0.5 else "more than 99 %"
-    return f"{probability:.0%}"
+    return f"{100 * probability:.0f} %"
 
 
 def _influence(shift: float) -> str:

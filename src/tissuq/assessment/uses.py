@@ -101,7 +101,8 @@ def _reporting(
     if half_width <= 1:
         width = f"known to {_ends_in_words(*((end - stiffness.mean) / abs(stiffness.mean) for end in (low, high)))}"
     if carried > PRECISE:
-        return Verdict.NO, f"the discrepancy carries {carried:.0%} of the initial stiffness, by which it may be off"
+        of_stiffness = f"{100 * carried:.0f} % of the initial stiffness"
+        return Verdict.NO, f"the discrepancy carries {of_stiffness}, by which it may be off"
     if not solution.model.discrepancy.parameters:
         return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
     if "contradicting-tests" in codes:
@@ -276,7 +277,7 @@ def _simulating(
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{worst.probability:.0%} of the draws are stable within the measured strains"
+    share = f"{100 * worst.probability:.0f} % of the draws are stable within the measured strains"
     if worst.probability < MIN_STABLE:
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:

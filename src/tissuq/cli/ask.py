@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError, TissuqError
+from tissuq.experiments.numbers import wrapped
 from tissuq.studies.answers import Answer, answers_in, options_in, with_options
 from tissuq.studies.files_of_tests import find_tests, tables_of, tests_in_words
 
@@ -77,7 +77,7 @@ def _chosen(
     now: Tests | None = None,
 ) -> dict[str, Any] | None:
     """Return the settings with the answer that a person types; None to leave things as they are ``now``."""
-    print(f"\n{fill(question, WIDTH)}")
+    print(f"\n{wrapped(question, WIDTH)}")
     outcomes = {
         answer: _what_it_gives(file, answer, settings, question, is_only_file=is_only_file) for answer in answers
     }
@@ -91,7 +91,7 @@ def _chosen(
     if now is not None:
         print(f"  Enter  leave it: {tests_in_words(now)}")
     for number, answer in enumerate(listed, start=1):
-        print(fill(f"{number}  {answer.text}: {outcomes.get(answer, '')}", WIDTH, initial_indent="  ",
+        print(wrapped(f"{number}  {answer.text}: {outcomes.get(answer, '')}", WIDTH, initial_indent="  ",
                    subsequent_indent="     "))  # fmt: skip
     while True:
         typed = _typed(f"Number{'' if now is None else ', Enter'} or options [1 to {len(listed)}]: ")

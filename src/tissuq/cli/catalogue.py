@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -14,6 +13,7 @@ from tissuq.cli.call import Call
 from tissuq.cli.command import CONFIGURED, command, settings_of
 from tissuq.cli.running import Running
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import wrapped
 from tissuq.studies.option import Settings, argument, slots_of
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy] 
         for p in kind.parameters:
             print(f"    {p.symbol:<6} {p.unit or '-':<4} {p.description}; prior {default_in_words(p)}")
         if kind.caution:
-            print(fill(kind.caution, 96, initial_indent="    Note: ", subsequent_indent="    "))
+            print(wrapped(kind.caution, 96, initial_indent="    Note: ", subsequent_indent="    "))
         print()
 
 

@@ -373,5 +373,6 @@ class EmulatorCheck:
     def __str__(self) -> str:
         return (
             f"{self.kind}: {len(self.points)} runs, relative error {self.relative_error:.2g} (root mean square), "
-            f"{self.share_inside:.0%} of the outputs inside 95 %, standardised errors {self.rms_standardised:.2g} (1)"
+            f"{100 * self.share_inside:.0f} % of the outputs inside 95 %, standardised errors "
+            f"{self.rms_standardised:.2g} (1)"
         )

@@ -106,8 +106,8 @@ def calibration_warnings(
     if emulator.runs.failed.any():
         share = _share_near_failures(emulator, posterior)
         position = (
-            f"A share of {share:.0%} of the posterior is nearer to a failed run than to any other: there the emulator "
-            "is unreliable."
+            f"A share of {100 * share:.0f} % of the posterior is nearer to a failed run than to any other: there the "
+            "emulator is unreliable."
             if share > MAX_SHARE_NEAR_FAILURES
             else "The posterior is not near them."
         )
@@ -235,8 +235,8 @@ def _large_error(
     advice = "Give more runs, or let some be placed where the posterior is (refine)."
     if emulator_share[largest_share] > MIN_EMULATOR_SHARE:
         yield (
-            f"the emulator's error is large beside the noise: it makes {emulator_share[largest_share]:.0%} of the "
-            f"posterior variance of {largest_share}. {advice}"
+            f"the emulator's error is large beside the noise: it makes {100 * emulator_share[largest_share]:.0f} % of "
+            f"the posterior variance of {largest_share}. {advice}"
         )
     elif shifts[largest_shift] > MAX_MEAN_SHIFT:
         shift = shifts[largest_shift]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from math import isfinite, nan
+from textwrap import fill
+from typing import Any
 
 __all__ = [
     "CROSS",
@@ -14,7 +16,9 @@ __all__ = [
     "number_and_unit",
     "number_in",
     "sides_and_unit",
+    "unbroken",
     "without_marks",
+    "wrapped",
 ]
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -27,11 +31,28 @@ MEAN_WITH_SPREAD = re.compile(rf"({NUMBER.pattern})\s*(?:±|\+/?[-−])\s*({NUMB
 MARKED = re.compile(r"(?<![\w.,'’])([+-]?\d{1,3})((?:[\u00a0\u202f\u2009'’]\d{3})+)(?=[.,\s;|\"<]|$)")
 """Digits with marks between thousands that are never decimal marks."""
 MARKS = re.compile("[\u00a0\u202f\u2009'’]")
+BEFORE_PERCENT = re.compile(r"(?<=\d) (?=%)")
 CROSS = r"\s*[x×*X]\s*"
 """Between the sides of something."""
 SIDE = rf"{NUMBER.pattern}(?:\s*[^\W\dxX×_]+)?"
 PRODUCT = re.compile(rf"{SIDE}(?:{CROSS}{SIDE})+")
 """Two sides or more, as in ``5 x 2 mm``."""
+
+
+def unbroken(text: str) -> str:
+    r"""Return a text in which no line ends between a number and its %.
+
+    Examples
+    --------
+    >>> unbroken("a 95 % interval, stress=10%")
+    'a 95\xa0% interval, stress=10%'
+    """
+    return BEFORE_PERCENT.sub("\u00a0", text)
+
+
+def wrapped(text: str, width: int, **indents: Any) -> str:
+    """Return a text in lines of some width, with the indents of `textwrap.fill`, numbers with their %."""
+    return fill(unbroken(text), width, **indents).replace("\u00a0", " ")
 
 
 def number_in(cell: str) -> float:

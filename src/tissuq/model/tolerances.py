@@ -391,10 +391,10 @@ class FittedErrors:
         if self.reconciling_stability is None:
             return ""
         share = self.reconciling_stability
-        probability = "less than 1 %" if share < 0.01 else f"{share:.0%}"
+        probability = "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
         return (
             "the tests contradict each other: a material that reconciles all of them is stable with a probability of "
             f"{probability} only. So a simpler discrepancy is fitted (auto-first), and the stresses of tests may "
-            f"differ by {CONTRADICTION_SPREAD:.0%}. See whether grips, friction, slack, direction or the state of "
-            "the specimens differed."
+            f"differ by {100 * CONTRADICTION_SPREAD:.0f} %. See whether grips, friction, slack, direction or the state "
+            "of the specimens differed."
         )

@@ -135,8 +135,8 @@ def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_reques
     model = next_test.model
     measured = measured_states(model).times(MAX_MEASURED_REACH)
     share_beyond = 1 - float(measured.contain(candidate.mode.paths[0].at(candidate.stretch)).mean())
-    notes = [f"{share_beyond:.0%} beyond the data"] * (share_beyond > 0)
-    notes += [f"stable up to there: {stable:.0%}"] * (stable < 1 - MIN_LOSS_PROBABILITY)
+    notes = [f"{100 * share_beyond:.0f} % beyond the data"] * (share_beyond > 0)
+    notes += [f"stable up to there: {100 * stable:.0f} %"] * (stable < 1 - MIN_LOSS_PROBABILITY)
     notes += [FEW_COMPONENTS] * (expected is not None and expected.is_rough) + [problem] * bool(problem)
     rows = []
     for column, target in enumerate(next_test.targets):

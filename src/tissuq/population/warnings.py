@@ -25,8 +25,8 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
         sentences.append(population.hierarchy.diagnostics.verdict)
     if population.hierarchy.effective <= MIN_EFFECTIVE_SHARE:
         sentences.append(
-            f"only {population.hierarchy.effective:.0%} of the draws remain effective when they are corrected for the "
-            "approximation of the specimens' posteriors by a few Gaussians: the approximation is too poor."
+            f"only {100 * population.hierarchy.effective:.0f} % of the draws remain effective when they are corrected "
+            "for the approximation of the specimens' posteriors by a few Gaussians: the approximation is too poor."
         )
     failed = [name for name, fit in population.posteriors.items() if fit.solution.is_approximate]
     if failed:

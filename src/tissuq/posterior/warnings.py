@@ -261,7 +261,7 @@ def _tests_apart(solution: Solution) -> str:
     return (
         f"the tests contradict each other: the stress of '{names[highest]}' is {factors[highest]:.2g} times that of "
         f"one material for all, and that of '{names[lowest]}' {factors[lowest]:.2g} times, farther apart than the "
-        f"spread of {spread:.0%} that {'tests of a specimen may have' if is_one_specimen else 'is assumed'}. "
+        f"spread of {100 * spread:.0f} % that {'tests of a specimen may have' if is_one_specimen else 'is assumed'}. "
         "The interval may hold neither. "
         "See whether units, areas, grips, friction, direction or the state of the specimens differed, and fit each by "
         "itself."

@@ -63,13 +63,13 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     model, runs = study.forward.name, len(calibration.runs)
     has_discrepancy = calibration.problem.discrepancy.is_correlated
     inside_alone = calibration.predictive_coverage(discrepancy=False)
-    remark = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
+    remark = f"of the forward model alone: {100 * inside_alone:.0f} %" if has_discrepancy else ""
     numbers = [
         Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""))
         for symbol, marginal in calibration.marginals.items()
         if symbol in calibration.problem.forward_symbols
     ]
-    inside = f"{calibration.predictive_coverage():.0%} of the measurements"
+    inside = f"{100 * calibration.predictive_coverage():.0f} % of the measurements"
     return Result(
         command=_repeated(settings.model_copy(update=relocated)),
         title="Parameters of an expensive forward model",
@@ -245,8 +245,8 @@ def readable_calibration(study: CalibrationStudy) -> list[list[str]]:
         low, high = marginal.hdi()
         mean, sd = (interval(number, number, marginal.sd)[0] for number in (marginal.mean, marginal.sd))
         ends = "[{}, {}]".format(*interval(low, high, marginal.sd))
-        share = calibration.emulator_share[symbol]
-        rows.append([study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
+        ess, share = calibration.posterior.ess[symbol], calibration.emulator_share[symbol]
+        rows.append([study.label(symbol), mean, sd, ends, f"{ess:.0f}", f"{100 * share:.0f} %"])
     return rows
 
 

@@ -48,7 +48,7 @@ def band_figure(calibration: Calibration, data: Mapping[str, Measured], *, is_na
                 pieces.line(axis, band["control"], band["mean"], label="predicted mean")
                 pieces.points(axis, measured.control, measured.measured)
                 inside = band["low"].le(measured.measured[order]) & band["high"].ge(measured.measured[order])
-                axis.set_title(f"{title}:  {inside.mean():.0%} inside")
+                axis.set_title(f"{title}:  {100 * inside.mean():.0f} % inside")
                 axis.set_xlabel(measured.control_label)
             row[0].set_ylabel(measured.measured_label)
         panels[0, 0].legend(fontsize=9)

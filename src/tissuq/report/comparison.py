@@ -63,7 +63,7 @@ def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]
                 _text(row["log_evidence"], ".2f"),
                 _text(row["log_bayes_factor"], ".2f"),
                 "" if isnan(ends[0]) else f"{ends[0]:.1f} to {ends[1]:.1f}",
-                _text(row["probability"], ".1%"),
+                _percent(row["probability"]),
                 f"{0.0 - row['elpd_difference']:.1f} ± {row['elpd_difference_error']:.1f}",
                 f"{row['stacking']:.2f}{' (rough)' if row['is_rough'] else ''}",
                 _interval(row, unit),
@@ -177,7 +177,7 @@ def _numbers(table: pd.DataFrame, unit: StressUnit) -> tuple[Number, ...]:
     numbers = []
     if table["log_evidence"].notna().any():
         name = str(table["log_evidence"].idxmax())
-        numbers.append(Number("largest evidence", name, remark=f"probability {table['probability'][name]:.0%}"))
+        numbers.append(Number("largest evidence", name, remark=f"probability {100 * table['probability'][name]:.0f} %"))
     best = str(table["elpd"].idxmax())
     numbers.append(Number("best for left-out measurements", best, remark=f"stacking {table['stacking'][best]:.2f}"))
     summarised = table.dropna(subset=["median"])
@@ -205,6 +205,10 @@ def parameter_header(table: pd.DataFrame, unit: StressUnit) -> str:
 
 def _text(value: float, form: str) -> str:
     return "" if isnan(value) else format(value, form)
+
+
+def _percent(share: float) -> str:
+    return "" if isnan(share) else f"{100 * share:.1f} %"
 
 
 def _interval(row: pd.Series[Any], unit: StressUnit) -> str:

@@ -78,8 +78,9 @@ def numbers_of_shares(table: pd.DataFrame, column: str, prob: float, words: str)
     shares = shares.iloc[(shares["mean"] - prob).abs().argsort(kind="stable").to_numpy()]
     numbers = []
     for name, row in shares.head(MAX_NUMBERS).iterrows():
-        ends = f"; {row['min']:.0%} to {row['max']:.0%} by case" if row["max"] > row["min"] else ""
-        numbers.append(Number(f"{words} '{name}'", f"{row['mean']:.0%}", remark=f"nominal {prob:.0%}{ends}"))
+        ends = f"; {100 * row['min']:.0f} % to {100 * row['max']:.0f} % by case" if row["max"] > row["min"] else ""
+        remark = f"nominal {100 * prob:.0f} %{ends}"
+        numbers.append(Number(f"{words} '{name}'", f"{100 * row['mean']:.0f} %", remark=remark))
     return tuple(numbers)
 
 

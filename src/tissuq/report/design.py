@@ -67,11 +67,12 @@ def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
     rows = []
     for _, row in _rows_of(study, target).iterrows():
         is_ranked = not isnan(row["reduction"])
+        error = f" ± {100 * row['error']:.1f} %" if row["error"] else ""
         rows.append(
             [
                 str(row["candidate"]),
                 f"{row['sd_after'] / factor:#.3g}" if is_ranked else "",
-                f"{row['reduction']:.1%}" + (f" ± {row['error']:.1%}" if row["error"] else "") if is_ranked else "",
+                f"{100 * row['reduction']:.1f} %{error}" if is_ranked else "",
                 str(row["note"]),
             ]
         )
@@ -189,9 +190,9 @@ def _best(study: DesignStudy, target: Target) -> Number | None:
     row = best.iloc[0]
     factor, unit = _unit(study, target)
     after = f"{significant(row['sd_after'] / factor)}{' ' * bool(unit)}{unit}"
-    remark = f"lowers its sd by {row['reduction']:.0%}, to {after}{_tied(best)}"
+    remark = f"lowers its sd by {100 * row['reduction']:.0f} %, to {after}{_tied(best)}"
     if len(again):
-        remark += f"; repeating the data, by {again.iloc[-1]['reduction']:.0%}"
+        remark += f"; repeating the data, by {100 * again.iloc[-1]['reduction']:.0f} %"
     return Number(f"For {target.title(study.posterior.model)}:", str(row["candidate"]), remark=remark)
 
 
@@ -204,10 +205,11 @@ def _sentences(study: DesignStudy) -> list[str]:
             continue
         row = best.iloc[0]
         title = _capitalised(target.title(study.posterior.model))
-        words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}{_tied(best)}"
+        reduction = f"{100 * row['reduction']:.0f} %{_tied(best)}"
+        words = f"{title}: {row['candidate']}, is expected to lower its sd by {reduction}"
         if len(again):
             repeat = again.iloc[-1]
-            words += f"; {repeat['candidate']}, by {repeat['reduction']:.0%}"
+            words += f"; {repeat['candidate']}, by {100 * repeat['reduction']:.0f} %"
         sentences.append(words + ".")
     return sentences
 

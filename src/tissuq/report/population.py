@@ -232,7 +232,7 @@ def _sections(
         f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2)"
         f"{'; of effects, normal with sd 1' * bool(population.covariates)}.",
         f"The specimens are integrated in closed form. {diagnostics.verdict} Effective share of the draws after "
-        f"importance correction: {population.hierarchy.effective:.1%}. {study.seconds:.0f} s.",
+        f"importance correction: {100 * population.hierarchy.effective:.1f} %. {study.seconds:.0f} s.",
     )
     if tolerances := _tolerances(population):
         sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
@@ -389,6 +389,6 @@ def _about_law(population: Population, warnings: Sequence[str]) -> str:
         return ""
     law = population.complete.model.material.name
     return (
-        f" {law} alone is wrong here: the discrepancy carries {share:.0%} of the stress "
+        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress "
         "(median of the specimens). Use it with the discrepancy, as exported cards do, or fit another law."
     )

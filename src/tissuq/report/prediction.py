@@ -161,7 +161,7 @@ def _shares(prediction: Prediction) -> list[Number]:
         numbers.append(Number("measurements inside the band", value, remark=remark))
     extrapolated = count - int(prediction.is_calibrated.sum())
     remark = "outside the measured range of I1 and I2" if extrapolated else "all within the measured range of I1 and I2"
-    numbers.append(Number("extrapolated", f"{extrapolated / count:.0%} of the points", remark=remark))
+    numbers.append(Number("extrapolated", f"{100 * extrapolated / count:.0f} % of the points", remark=remark))
     return numbers
 
 
@@ -262,8 +262,8 @@ def _lead_of_scores(prediction: Prediction) -> str:
         ]
         stress_words = f" ({name})" if len(prediction.stresses) > 1 else ""
         findings = [
-            f"{row['inside']:.0%} lie in the {100 * prediction.prob:.4g} % band ({scored_kind(prediction, row)}), "
-            f"whose median errs by {share_words(row['error'])} of the stress"
+            f"{100 * row['inside']:.0f} % lie in the {100 * prediction.prob:.4g} % band "
+            f"({scored_kind(prediction, row)}), whose median errs by {share_words(row['error'])} of the stress"
             for row in rows.to_dict("records")
         ]
         count = rows["count"].iloc[0]

@@ -91,7 +91,7 @@ def scored_kind(prediction: Prediction, row: Mapping[Any, Any]) -> str:
 
 def share_words(value: float) -> str:
     """Return a share of the stress as a percentage."""
-    return "" if isnan(value) else f"{value:.0%}" if value < MAX_SHARE else f"> {MAX_SHARE:.0%}"
+    return "" if isnan(value) else f"{100 * value:.0f} %" if value < MAX_SHARE else f"> {100 * MAX_SHARE:.0f} %"
 
 
 def _stress(value: float) -> str:

@@ -19,6 +19,7 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import unbroken
 from tissuq.studies.settings import INPUT, RECIPE
 
 if TYPE_CHECKING:
@@ -209,17 +210,22 @@ def _templates() -> Environment:
 
     templates = Environment(
         loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
+        lstrip_blocks=True, finalize=_in_one_piece,
     )  # fmt: skip
     templates.filters["prose"] = _prose
     return templates
+
+
+def _in_one_piece(value: Any) -> Any:
+    """Return what a template shows, in plain texts with numbers on the line of their %."""
+    return unbroken(value) if type(value) is str else value
 
 
 def _prose(text: str) -> Markup:
     """Return a text as HTML: ``**strong**``, `` `code` ``, options in one piece; everything else in it is escaped."""
     from markupsafe import Markup, escape
 
-    marked = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", str(escape(text)))
+    marked = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", str(escape(unbroken(text))))
     marked = re.sub(r"(?<![\w-])(--[a-z][a-z-]+[a-z])", r"<span class=option>\1</span>", marked)
     return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", marked))  # noqa: S704 (escaped above)
 

@@ -123,7 +123,7 @@ def summary_table(rows: list[Row], unit: StressUnit, title: str, main: str = "")
         line = [row["formulation"], middle, interval(sd, sd, sd)[0], f"[{ends}]"]
         line += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * has_truth
         line.append("" if row["log_evidence"] is None else f"{row['log_evidence']:.2f}")
-        line += [f"{row[column]:.0%}" for column in ("predictive_coverage", "predictive_coverage_model_only")]
+        line += [f"{100 * row[column]:.0f} %" for column in ("predictive_coverage", "predictive_coverage_model_only")]
         line += [percent(row["stable"])] if has_stability else []
         line += [stretch_in_words(*(row[column] for column in STABILITY[1:]))] if is_lost else []
         if is_sampled:

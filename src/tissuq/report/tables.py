@@ -99,7 +99,7 @@ def _with_exponent(number: float, decimals: int) -> str:
 
 def percent(probability: float | None) -> str:
     """Return a share as a percentage; nothing for one that is missing."""
-    return "" if probability is None else f"{probability:.0%}"
+    return "" if probability is None else f"{100 * probability:.0f} %"
 
 
 def stretch_in_words(median: float | None, low: float | None, high: float | None) -> str:

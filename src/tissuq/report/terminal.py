@@ -6,9 +6,9 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from textwrap import fill
 from typing import Any
 
+from tissuq.experiments.numbers import wrapped
 from tissuq.report.result import Record, TableRecord, UseRecord, few_and_others
 from tissuq.result_warning import Severity, in_shell
 
@@ -65,13 +65,13 @@ def _side_by_side(widths: Sequence[int], available: int) -> list[list[int]]:
 def print_warnings(warnings: Sequence[str], head: str = "Warning") -> None:
     """Print warnings about a result."""
     for text in map(in_shell, warnings):
-        print(fill(text, TEXT_WIDTH, initial_indent=f"{head}: ", subsequent_indent="  ", break_on_hyphens=False))
+        print(wrapped(text, TEXT_WIDTH, initial_indent=f"{head}: ", subsequent_indent="  ", break_on_hyphens=False))
 
 
 def print_explanations(explanations: Sequence[str]) -> None:
     """Print how to read a table."""
     for text in explanations:
-        print(fill(text, TEXT_WIDTH, initial_indent="- ", subsequent_indent="  "))
+        print(wrapped(text, TEXT_WIDTH, initial_indent="- ", subsequent_indent="  "))
 
 
 def print_result(record: Record, folder: Path | None = None, *, details: bool = False) -> None:
@@ -92,7 +92,7 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     print(f"\n{record['title']}")
     _print_numbers(record["numbers"])
     if record["finding"]:
-        print(fill(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
+        print(wrapped(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
     if record["uses"]:
         print()
     _print_uses(record["uses"])
@@ -114,7 +114,7 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
         titles = ", ".join(section["title"] for section in record["sections"])
         count = f"{titles and '; '}further warnings and notes ({len(folded)})" if folded else ""
         words = f"More: {titles}{count}: tissuq show {shlex.quote(str(folder))} --details"
-        print(fill(words, TEXT_WIDTH, subsequent_indent="  ", break_on_hyphens=False))
+        print(wrapped(words, TEXT_WIDTH, subsequent_indent="  ", break_on_hyphens=False))
     print(f"Report: {folder / 'report.html'}")
 
 
@@ -131,20 +131,20 @@ def _print_uses(uses: Sequence[UseRecord]) -> None:
     width = max((len(use["verdict"]) for use in uses), default=0)
     for use in uses:
         start = f"  {use['verdict'].upper():<{width}}  "
-        print(fill(f"{use['purpose']}: {use['reason']}", TEXT_WIDTH, initial_indent=start,
+        print(wrapped(f"{use['purpose']}: {use['reason']}", TEXT_WIDTH, initial_indent=start,
                    subsequent_indent=" " * len(start)))  # fmt: skip
 
 
 def _print_next(step: str, folder: Path | None) -> None:
     """Print what to do next, with the folder of the run where the step names it."""
     words = _plain(step).replace("{run}", shlex.quote(str(folder)))
-    print("\n" + fill(words, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
+    print("\n" + wrapped(words, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
 
 
 def _print_table(table: TableRecord) -> None:
     print_rows(table["title"], table["headers"], table["rows"])
     if table["note"]:
-        print(fill(_plain(table["note"]), TEXT_WIDTH))
+        print(wrapped(_plain(table["note"]), TEXT_WIDTH))
 
 
 def _plain(text: str) -> str:

@@ -60,8 +60,8 @@ class DesignStudy:
     def explanations(self) -> list[str]:
         """How to read the table."""
         whose = (
-            f"another specimen, whose stresses differ by about {self.error:.0%} as a whole; standard deviations, now "
-            "and after, are of the mean of the tissue's specimens"
+            f"another specimen, whose stresses differ by about {100 * self.error:.0f} % as a whole; standard "
+            "deviations, now and after, are of the mean of the tissue's specimens"
             if self.specimen == "other"
             else "the same specimen, without additional test errors; for another specimen use --next-specimen other"
         )
@@ -78,9 +78,9 @@ class DesignStudy:
         """Warnings about the numbers in the table."""
         inaccurate = "Numbers marked rough are not reliable: few components of the posterior would remain."
         unexplained = [
-            f"{target.words}: the stresses of the material within the measured strains explain {target.explained:.0%} "
-            "of its variance over the draws of the ensemble. The rest (strains beyond, other materials, what is not "
-            "linear) stays in every expected sd."
+            f"{target.words}: the stresses of the material within the measured strains explain "
+            f"{100 * target.explained:.0f} % of its variance over the draws of the ensemble. The rest (strains beyond, "
+            "other materials, what is not linear) stays in every expected sd."
             for target in self.targets
             if isinstance(target, QuantityTarget) and target.explained < WELL_EXPLAINED
         ]

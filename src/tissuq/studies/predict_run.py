@@ -234,7 +234,7 @@ def _prediction_warnings(
     outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
         largest = max((shares.max() for shares in extrapolated.values()), default=0.0)
-        due = f"; beyond, up to {largest:.0%} of the variance of the stress is due to how the energy goes on"
+        due = f"; beyond, up to {100 * largest:.0f} % of the variance of the stress is due to how the energy goes on"
         calibrated = f"{_calibrated_in_words(posterior, mode)}{due if largest else ''}"
         texts.append(f"{outside} lie outside the measured range: {calibrated}.")
     if data is not None and not was_fitted and model.tolerances.estimand in (AS_TESTED, SPECIMEN):

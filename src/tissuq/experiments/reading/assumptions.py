@@ -43,8 +43,8 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
         strain = STRAIN_MEASURES[choices[0].strain_type].strain
         largest = float(np.abs(strain(measured.stretch)).max()) if strain else 0.0
         sentences.append(
-            f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which "
-            "it is: --strain-unit % or --strain-unit 1."
+            f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {100 * largest:.0f} %; "
+            "say which it is: --strain-unit % or --strain-unit 1."
         )
     if UNIT_ASSUMED in source:
         sentences.append(

@@ -55,7 +55,7 @@ REGION_CODES: Mapping[str, tuple[str, Severity]] = {
 }
 """Code and severity of the warnings about kinds of regions, where they are no cautions about the measurements."""
 HYSTERESIS = (
-    "loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one curve"
+    "loading and unloading differ by up to {percent:.0f} % of the largest stress, and an elastic material has one curve"
 )
 DISTURBED = {"rupture", "hold", "slip"}
 """What makes loading and unloading differ without hysteresis."""
@@ -116,7 +116,7 @@ def _cycles(reading: Reading, number: int) -> str:
     seen = f"all {count} cycles are used{_change_of_peaks(reading, number)}"
     advice = "to fit one, give --cycle last, first or a number"
     if share := _hysteresis_share(reading, number):
-        seen += f", and {HYSTERESIS.format(share=share)}"
+        seen += f", and {HYSTERESIS.format(percent=100 * share)}"
         advice = "to fit one branch of one cycle, give --cycle last --branch loading"
     return f"{seen}; {'; '.join(filter(None, (advice, numbered or _several_specimens(reading, number))))}."
 
@@ -133,8 +133,8 @@ def _several_specimens(reading: Reading, number: int) -> str:
         return ""
     return (
         f"as no unloading between them was recorded, and at one deformation their stresses differ by up to "
-        f"{difference:.0%} of the largest, they may be tests of several specimens: then name the specimen of every row "
-        "in a column 'specimen', or write a file for each"
+        f"{100 * difference:.0f} % of the largest, they may be tests of several specimens: then name the specimen of "
+        "every row in a column 'specimen', or write a file for each"
     )
 
 
@@ -159,7 +159,7 @@ def _change_of_peaks(reading: Reading, number: int) -> str:
     if np.ptp(reached) > SAME_PEAK * np.ptp(reading.used.course) or abs(change) < NOTABLE_SHARE:
         return ""
     how = "falls" if change < 0 else "rises"
-    return f", at whose peaks the stress {how} by {abs(change):.0%} of the largest from the first to the last"
+    return f", at whose peaks the stress {how} by {100 * abs(change):.0f} % of the largest from the first to the last"
 
 
 def _has_cycles(reading: Reading) -> bool:
@@ -179,7 +179,8 @@ def _hysteresis(reading: Reading, number: int) -> str:
     if _has_cycles(reading) and _ratios(reading) == 1:
         return ""  # said of the cycles
     share = _hysteresis_share(reading, number)
-    return f"{HYSTERESIS.format(share=share)}; to fit one of them, give --branch loading or unloading." if share else ""
+    seen = HYSTERESIS.format(percent=100 * share)
+    return f"{seen}; to fit one of them, give --branch loading or unloading." if share else ""
 
 
 def _hysteresis_share(reading: Reading, number: int) -> float:
@@ -255,8 +256,8 @@ def _stress_at_rest(reading: Reading, number: int) -> str:
         )
     return (
         f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
-        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which {options} "
-        f"takes off{beside}. A hyperelastic material has no stress at {control.name} {control.reference:g}."
+        f"{100 * abs(at_reference) / largest:.0f} % of the largest: a preload, or the zero of the load cell, which "
+        f"{options} takes off{beside}. A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
 
 

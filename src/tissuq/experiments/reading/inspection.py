@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from textwrap import fill
 from typing import Any, Unpack
 
 import numpy as np
 
+from tissuq.experiments.numbers import wrapped
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
@@ -226,4 +226,4 @@ def _span(lines: Sequence[int]) -> str:
 
 
 def _wrapped(label: str, text: str) -> str:
-    return fill(f"{label:<{LABEL_WIDTH}}{text}", TEXT_WIDTH, subsequent_indent=" " * LABEL_WIDTH)
+    return wrapped(f"{label:<{LABEL_WIDTH}}{text}", TEXT_WIDTH, subsequent_indent=" " * LABEL_WIDTH)

@@ -58,7 +58,7 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
     if not has_unit and np.abs(strain).max() > PLAIN_STRAIN_LIMIT:
         row = int(np.argmax(np.abs(strain)))
         raise InputError(
-            f"{table.place(column, row)}: strain {strain[row]:g} without a unit would be {strain[row]:.0%}. "
+            f"{table.place(column, row)}: strain {strain[row]:g} without a unit would be {100 * strain[row]:.0f} %. "
             'Give strain_unit="%" (--strain-unit %) if it is percent, strain_unit="1" if it is a plain ratio.'
         )
     start = int(np.argmin(np.abs(strain - 1.0)))
@@ -122,9 +122,9 @@ def check_positions(table: Table, choice: ColumnChoice, displacement: Column, lo
         f"(stretch {low:.4g} to {high:.4g})" for low, high in (ends + 1 - start / length, ends + 1, ends)
     )
     raise InputError(
-        f"{table.place(choice.deformation, 0)}: begins at {start:g} mm with {size[0]:.0%} of the largest load, so that "
-        f"nothing shows where the specimen is undeformed. If it is there, give --zero first {from_first}; if at 0, "
-        f"--zero '0 mm' {from_zero}; if it is undeformed at first, and the load cell reads that without load, "
+        f"{table.place(choice.deformation, 0)}: begins at {start:g} mm with {100 * size[0]:.0f} % of the largest load, "
+        f"so that nothing shows where the specimen is undeformed. If it is there, give --zero first {from_first}; if "
+        f"at 0, --zero '0 mm' {from_zero}; if it is undeformed at first, and the load cell reads that without load, "
         "--load-zero first; if the column holds the length or height of the specimen, --column "
         f"'length={table.key(choice.deformation)}' {of_length}."
     )

@@ -190,7 +190,7 @@ def _rupture(tested: TestedStress) -> Iterator[Region]:
             "rupture",
             rows,
             f"after {tested.place(np.array([row]))} ({tested.control.name} {tested.course[row]:.4g}) the stress falls "
-            f"by {rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
+            f"by {100 * rupture.fall:.0f} % of the largest while the test goes on: the specimen tore, or slipped; "
             f"{advice}",
         )
 
@@ -204,7 +204,7 @@ def _holds(tested: TestedStress) -> Iterator[Region]:
             "hold",
             rows,
             f"in {tested.place(rows)} the stretch rests while the stress falls by up to "
-            f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; "
+            f"{100 * max(hold.fall for hold in holds):.0f} % of the largest: it relaxes, as no elastic material does; "
             f"{relaxed}{_leave_out(tested, rows) if is_before_peak else UNTIL_PEAK}",
         )
 
@@ -215,9 +215,10 @@ def _slips(tested: TestedStress) -> Iterator[Region]:
         yield Region(
             "slip",
             rows,
-            f"in {tested.place(rows)} the stress suddenly falls, by up to {max(slip.fall for slip in slips):.1%} "
-            "of the largest, and the test goes on: the specimen slipped in the grips, or tore a little, and stretches "
-            f"from there on are too large; {_leave_out(tested, np.arange(slips[0].start, len(tested.used)))}",
+            f"in {tested.place(rows)} the stress suddenly falls, by up to "
+            f"{100 * max(slip.fall for slip in slips):.1f} % of the largest, and the test goes on: the specimen "
+            f"slipped in the grips, or tore a little, and stretches from there on are too large; "
+            f"{_leave_out(tested, np.arange(slips[0].start, len(tested.used)))}",
         )
 
 
@@ -285,9 +286,9 @@ def _drift(tested: TestedStress) -> Iterator[Region]:
             "drift",
             np.array([0, len(stress) - 1]),
             f"the stress is {begin} {tested.unit.name} at the beginning and {end} {tested.unit.name} at the end, back "
-            f"at {tested.control.name} {course[-1]:.4g}, {abs(drift[1] - drift[0]) / np.abs(stress).max():.0%} of the "
-            "largest apart: the zero of the load cell drifts, or the specimen has changed for good; to fit one branch "
-            "give --branch loading, and for a zero that is not sure --tolerance "
+            f"at {tested.control.name} {course[-1]:.4g}, {100 * abs(drift[1] - drift[0]) / np.abs(stress).max():.0f} % "
+            "of the largest apart: the zero of the load cell drifts, or the specimen has changed for good; to fit one "
+            "branch give --branch loading, and for a zero that is not sure --tolerance "
             f"zero={abs(drift[1] - drift[0]) / 2 / tested.unit.to_mpa:.2g}.",
         )
 
@@ -298,8 +299,8 @@ def _load_step(tested: TestedStress) -> Iterator[Region]:
         yield Region(
             "resolution",
             np.array([], dtype=np.intp),
-            f"the stresses are multiples of {step / tested.unit.to_mpa:.3g} {tested.unit.name}, {share:.1%} of the "
-            f"largest: the resolution of the load cell, or few digits in the file. A fit allows for an error of "
+            f"the stresses are multiples of {step / tested.unit.to_mpa:.3g} {tested.unit.name}, {100 * share:.1f} % of "
+            f"the largest: the resolution of the load cell, or few digits in the file. A fit allows for an error of "
             f"{UNIFORM_SD * share:.2g} of the largest in each; to state another one give --tolerance "
             f"resolution={UNIFORM_SD * share:.2g}.",
         )

@@ -154,11 +154,11 @@ def _widths(findings: Findings) -> dict[str, float]:
 
 def _band_report(findings: Findings) -> str:
     widths = ", ".join(f"{name} {ratio:.1f} times" for name, ratio in _widths(findings).items())
-    inside = ", ".join(f"{findings[name].inside:.0%}" for name in INFLATED)
+    inside = ", ".join(f"{100 * findings[name].inside:.0f} %" for name in INFLATED)
     shift = max(findings[name].mean_shift for name in INFLATED)
     return (
         f"band width relative to no discrepancy: {widths}; measurements inside: {inside}; "
-        f"the mean curve moves by at most {shift:.0%} of the largest stress"
+        f"the mean curve moves by at most {100 * shift:.0f} % of the largest stress"
     )
 
 
