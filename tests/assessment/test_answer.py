@@ -13,7 +13,7 @@ import tissuq as tq
 from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
 from tissuq.assessment.next_step import STEPS, Step, _with_options
-from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, _precision, uses_of
+from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, precision_of, uses_of
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.result_warning import ResultWarning, Severity
@@ -325,4 +325,4 @@ def test_the_next_step_has_the_options_of_the_warning_on_which_it_rests(warning,
      (np.nan, Verdict.NO, "not known at all")],
 )  # fmt: skip
 def test_a_width_is_said_as_far_as_it_means_something(half_width, verdict, words):
-    assert _precision(half_width) == (verdict, words)
+    assert precision_of(half_width) == (verdict, words)

@@ -20,7 +20,19 @@ from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["MIN_OFTEN_STABLE", "MIN_STABLE", "PRECISE", "SPREAD", "UNKNOWN", "Use", "Verdict", "uses_of"]
+__all__ = [
+    "MIN_OFTEN_STABLE",
+    "MIN_STABLE",
+    "PRECISE",
+    "SPREAD",
+    "UNKNOWN",
+    "Use",
+    "Verdict",
+    "precision_of",
+    "relative_half_width",
+    "uses_of",
+    "worst_of",
+]
 
 PRECISE, USEFUL = 0.2, 0.5
 """Half widths of 95 % intervals, over the mean, up to which a number is precise, and of use."""
@@ -97,22 +109,22 @@ def _reporting(
     carried = abs(shares_of_discrepancy(solution)[1][0])
     low, high = stiffness.hdi()
     half_width = (high - low) / 2 / abs(stiffness.mean)
-    verdict, width = _precision(half_width)
+    verdict, width = precision_of(half_width)
     if half_width <= 1:
         width = f"known to {_ends_in_words(*((end - stiffness.mean) / abs(stiffness.mean) for end in (low, high)))}"
     if carried > PRECISE:
         of_stiffness = f"{100 * carried:.0f} % of the initial stiffness"
         return Verdict.NO, f"the discrepancy carries {of_stiffness}, by which it may be off"
     if not solution.model.discrepancy.parameters:
-        return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
+        return worst_of(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
     if "contradicting-tests" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
+        return worst_of(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
     if "prior-dominates" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
+        return worst_of(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
     if "not-near-reference" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
+        return worst_of(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
     if "measurements" in codes:
-        return _worst(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
+        return worst_of(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
     model = solution.model
     if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
         names = " and ".join(f"'{error.name}'" for error, _ in model.tolerances if error.name in ("stress", "test"))
@@ -124,7 +136,7 @@ def _reporting(
     return verdict, width
 
 
-def _precision(half_width: float) -> tuple[Verdict, str]:
+def precision_of(half_width: float) -> tuple[Verdict, str]:
     """Return a verdict on the half width of an interval over its middle, and the width in words."""
     verdict = Verdict.YES if half_width <= PRECISE else Verdict.CARE if half_width <= USEFUL else Verdict.NO
     return verdict, f"known to {_percent(half_width)}" if half_width <= UNKNOWN else _percent(half_width)
@@ -143,7 +155,8 @@ def _ends_in_words(low: float, high: float) -> str:
     return f"within {100 * low:.0f} % and +{100 * high:.0f} %".replace("-", "−")
 
 
-def _worst(*verdicts: Verdict) -> Verdict:
+def worst_of(*verdicts: Verdict) -> Verdict:
+    """Return the worst of some verdicts."""
     return max(verdicts, key=list(Verdict).index)
 
 
@@ -154,10 +167,10 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
     held, count = int(inside.sum()), len(inside)
     counts = f"{held} of {count} measurements inside the band"
     try:
-        widths = [_relative_half_width(_band_of(solution, curve)) for curve in solution.model.experiment.curves]
+        widths = [relative_half_width(_band_of(solution, curve)) for curve in solution.model.experiment.curves]
     except TissuqError as error:
         return Verdict.NO, str(error)
-    verdict, width = _precision(max(widths))
+    verdict, width = precision_of(max(widths))
     if held < MIN_INSIDE * count:
         return Verdict.NO, f"only {counts}"
     names = [curve.name for curve in solution.model.experiment.curves]
@@ -171,7 +184,7 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
                          ("contradicting-tests", "the tests contradict each other"),
                          ("measurements", "see the warning about the measurements")):  # fmt: skip
         if code in codes:
-            return _worst(verdict, Verdict.CARE), f"{sentence}, but {reason}"
+            return worst_of(verdict, Verdict.CARE), f"{sentence}, but {reason}"
     return verdict, sentence
 
 
@@ -182,7 +195,7 @@ def _band_of(solution: Solution, curve: Curve) -> Band:
     return predict_band(solution, curve.points[rows], noise=False, mode=curve.mode, channel=curve.channel)
 
 
-def _relative_half_width(band: Band) -> float:
+def relative_half_width(band: Band) -> float:
     """Return the root mean square of half the width of a band over that of its median."""
     size = float(np.sqrt(np.mean(band.median**2)))
     return float(np.sqrt(np.mean((band.high - band.low) ** 2))) / 2 / size if size else np.inf
@@ -206,14 +219,14 @@ def _other_modes(
     try:
         widths = {
             name: [
-                _relative_half_width(predict_band(solution, stretch, noise=False, mode=name))
+                relative_half_width(predict_band(solution, stretch, noise=False, mode=name))
                 for stretch in _compression_and_tension(stable_range)
             ]
             for name, stable_range in unmeasured.items()
         }
     except TissuqError as error:
         return Verdict.NO, str(error)
-    verdict = _worst(*(_precision(width)[0] for of_mode in widths.values() for width in of_mode))
+    verdict = worst_of(*(precision_of(width)[0] for of_mode in widths.values() for width in of_mode))
     is_same = measured == {"uniaxial"} and _differ(widths.get("equibiaxial", [0.0]))
     explained = " (the strains of uniaxial tension)" if is_same else ""
     of_modes = ", ".join(
@@ -224,7 +237,7 @@ def _other_modes(
     sentence = f"within the strains that were {origin}: {of_modes}"
     is_one_path = len(measured) == 1 and len(model.experiment.modes[0].controls) == 1
     if solution.is_of_data and is_one_path:
-        return _worst(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
+        return worst_of(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
     return verdict, sentence
 
 
@@ -288,4 +301,4 @@ def _simulating(
     stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
     if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
         return Verdict.CARE, f"as uncertain as the other loading modes above; {share}"
-    return _worst(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"
+    return worst_of(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"

@@ -8,7 +8,7 @@ from statistics import median
 from tissuq.population.draws import PopulationDraws
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["MIN_EFFECTIVE_SHARE", "far_specimens", "warnings_of"]
+__all__ = ["MIN_EFFECTIVE_SHARE", "far_specimens", "has_few_specimens", "warnings_of"]
 
 MIN_EFFECTIVE_SHARE = 0.5
 """Smallest share of draws that must remain effective when they are corrected."""
@@ -34,7 +34,7 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
             f"sampling has not converged for the separate fit of {', '.join(failed)}, on which the population depends."
         )
     columns = len(population.covariates.effects)
-    if len(population.names) - columns < MIN_SPECIMENS_FOR_SPREAD:
+    if has_few_specimens(population):
         beside = f" beside {columns} effects of covariates" * bool(columns)
         sentences.append(
             f"{len(population.names)} specimens determine the spread poorly{beside}: its prior, half-normal with sd "
@@ -45,6 +45,11 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
             f"the new specimen is beyond the specimens: {', '.join(extrapolated)}. That effects go on so is assumed."
         )
     return tuple(sentences)
+
+
+def has_few_specimens(population: PopulationDraws) -> bool:
+    """Return whether there are so few specimens that the prior of the spread has much influence."""
+    return len(population.names) - len(population.covariates.effects) < MIN_SPECIMENS_FOR_SPREAD
 
 
 def _equal_specimens(population: PopulationDraws) -> Iterator[str]:

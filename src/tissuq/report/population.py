@@ -14,8 +14,10 @@ from tissuq.assessment.uses import PRECISE
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.population.picture import numbers_of
+from tissuq.population.uses import uses_of_population
 from tissuq.population.warnings import far_specimens
-from tissuq.report.population_figures import Bands, headline, headline_figure, patient_figure, specimens_figure
+from tissuq.prediction.bands import Band
+from tissuq.report.population_figures import MODULUS, Bands, headline, headline_figure, patient_figure, specimens_figure
 from tissuq.report.population_tables import (
     copy_of_covariates,
     effects_of_covariates,
@@ -110,12 +112,17 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
     count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
     modes = ", ".join(mode.name for mode in study.modes)
+    words = headline(population)[0]
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
+        uses=uses_of_population(
+            population, [_band(of_mode) for of_mode, _ in bands.values()], study.warnings,
+            "modulus" if words == MODULUS else words,
+        ),
         next_step=_next_step(population, study.warnings, settings.without),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
@@ -278,6 +285,11 @@ def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]
         else:
             bands[mode] = (band, material_alone)
     return bands, not_predicted
+
+
+def _band(table: pd.DataFrame) -> Band:
+    """Return the stress of a new specimen as a band, MPa."""
+    return Band(*(table[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
 
 
 def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFrame:

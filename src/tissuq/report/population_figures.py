@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
     from tissuq.population import Population
 
-__all__ = ["Bands", "headline", "headline_figure", "patient_figure", "specimens_figure"]
+__all__ = ["MODULUS", "Bands", "headline", "headline_figure", "patient_figure", "specimens_figure"]
 
 Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
 """Stress of a new specimen with the model error, and of the material alone."""
+MODULUS = "initial shear modulus"
 
 
 def headline(population: Population) -> tuple[str, float]:
@@ -38,7 +39,7 @@ def headline(population: Population) -> tuple[str, float]:
     if modulus_symbols(model) != (symbol,) or model.bent_symbols:
         return symbol, 1.0
     of_the_first = [float(parameter.symbol == symbol) for parameter in model.material.parameters]
-    return "initial shear modulus", initial_shear_modulus(model.material, of_the_first)
+    return MODULUS, initial_shear_modulus(model.material, of_the_first)
 
 
 def headline_figure(population: Population, unit: StressUnit) -> Figure:

@@ -1,0 +1,90 @@
+"""For what a population can be used: reporting the modulus of the tissue, predicting a new specimen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.uses import PRECISE, Use, Verdict, precision_of, relative_half_width, worst_of
+from tissuq.population.picture import numbers_of
+from tissuq.population.population import Population
+from tissuq.population.warnings import far_specimens, has_few_specimens
+from tissuq.prediction.bands import Band
+from tissuq.result_warning import has_code
+
+__all__ = ["uses_of_population"]
+
+
+def uses_of_population(
+    population: Population, bands: Sequence[Band], warnings: Sequence[str], quantity: str = "modulus"
+) -> tuple[Use, ...]:
+    """Return for what a population can be used, by the limits that hold for the fit of a specimen.
+
+    Parameters
+    ----------
+    population : Population
+    bands : sequence of Band
+        Of the stress of a new specimen, without noise, where specimens were measured; none where it is not predicted.
+    warnings : sequence of str
+        Those that the population carries, and those about its measurements.
+    quantity : str
+        What the first pooled parameter is, or stands for.
+    """
+    against = _reason_against(population, warnings)
+    return (
+        Use(f"report the {quantity} of the tissue", *((Verdict.NO, against) if against else _reporting(population))),
+        Use("predict a new specimen", *((Verdict.NO, against) if against else _predicting(population, bands))),
+    )
+
+
+def _reason_against(population: Population, warnings: Sequence[str]) -> str:
+    """Return what stands against any use; nothing where nothing does."""
+    far = ", ".join(far_specimens(population))
+    reasons = {
+        "sampling has not converged": not population.converged,
+        "what was read of the files is doubtful, as the warning says": has_code(warnings, "doubtful-reading"),
+        f"{far} differs from the others as much as by a mistaken unit, as the warning says": bool(far),
+        "there is stress at rest, so that moduli may be off by far more than their intervals": (
+            has_code(warnings, "stress-at-rest")
+        ),
+        "the discrepancy aims at the best fit, not at the parameters": (
+            population.complete.model.discrepancy.is_best_fit
+        ),
+    }
+    return next((reason for reason, applies in reasons.items() if applies), "")
+
+
+def _reporting(population: Population) -> tuple[Verdict, str]:
+    """Return whether the median of the population can be reported."""
+    shares = [abs(shares_of_discrepancy(fit.solution)[1][0]) for fit in population.posteriors.values()]
+    carried = float(np.median(shares))
+    if carried > PRECISE:
+        of_stiffness = f"{100 * carried:.0f} % of the initial stiffness (median of the specimens)"
+        return Verdict.NO, f"the discrepancy carries {of_stiffness}, by which it may be off"
+    numbers = numbers_of(population.summary(unit="MPa"))[population.symbols[0], "median"]
+    half_width = (numbers["hdi_high"] - numbers["hdi_low"]) / 2 / abs(numbers["median"])
+    verdict, width = precision_of(half_width)
+    return _beside_law(population, verdict, f"median over specimens {width}")
+
+
+def _predicting(population: Population, bands: Sequence[Band]) -> tuple[Verdict, str]:
+    """Return whether the stress of a specimen that was not measured can be predicted, where others were."""
+    if not bands:
+        return Verdict.NO, "its stress is not predicted in the modes that were measured"
+    verdict, width = precision_of(max(map(relative_half_width, bands)))
+    sentence = f"its stress {width} on average where specimens were measured, their spread included"
+    if beyond := population.covariates.beyond(population.patient_covariates):
+        return worst_of(verdict, Verdict.CARE), f"{sentence}, but it is beyond the specimens: {', '.join(beyond)}"
+    if has_few_specimens(population):
+        few = f"which {len(population.names)} specimens determine no better than its prior"
+        return worst_of(verdict, Verdict.CARE), f"{sentence}, {few}"
+    return _beside_law(population, verdict, sentence)
+
+
+def _beside_law(population: Population, verdict: Verdict, sentence: str) -> tuple[Verdict, str]:
+    """Return a verdict that holds where the law is right, if no error of it was allowed for."""
+    if population.complete.model.discrepancy.parameters:
+        return verdict, sentence
+    return worst_of(verdict, Verdict.CARE), f"{sentence}, if the material is right: its errors are not included"

@@ -1,0 +1,85 @@
+"""For what populations can be used, by the limits of the documentation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.assessment.uses import Verdict
+from tissuq.population.uses import uses_of_population
+from tissuq.prediction.bands import Band
+from tissuq.result_warning import ResultWarning
+
+STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
+MODULI = [0.42, 0.46, 0.5, 0.54, 0.48, 0.52]
+
+
+def population(moduli, discrepancy="none", noise_sd=0.01):
+    tests = {
+        f"s{place}": tq.simulate("neo-hookean", {"C10": modulus}, STRETCH, noise_sd=noise_sd, seed=place)
+        for place, modulus in enumerate(moduli)
+    }
+    return tq.fit_population(tests, discrepancy=discrepancy, noise_sd=noise_sd)
+
+
+@pytest.fixture(scope="module")
+def alike():
+    """Six specimens that differ little: their median is known to 8 % or so."""
+    return population(MODULI)
+
+
+def band(half_width):
+    """A band of that half width over its median."""
+    median = 2 * (STRETCH - STRETCH**-2)
+    return Band(STRETCH, median, median - half_width * abs(median), median + half_width * abs(median))
+
+
+def test_the_modulus_of_a_tissue_is_reported_as_its_median_is_known(alike):
+    row = alike.summary(unit="MPa").loc[("C10", "median")]
+    half_width = float(row["hdi_high"] - row["hdi_low"]) / 2 / float(row["median"])
+    assert half_width < 0.2
+    reporting, _ = uses_of_population(alike, [band(0.1)], ())
+    assert reporting.purpose == "report the modulus of the tissue"
+    assert reporting.verdict is Verdict.CARE  # without a discrepancy
+    assert f"known to ± {100 * half_width:.2g} %" in reporting.reason
+    assert reporting.reason.endswith("if the material is right: its errors are not included")
+
+
+@pytest.mark.parametrize(("width", "verdict"), [(0.15, Verdict.CARE), (0.45, Verdict.CARE), (0.55, Verdict.NO)])
+def test_a_new_specimen_is_predicted_as_its_stress_is_known(alike, width, verdict):
+    _, predicting = uses_of_population(alike, [band(0.05), band(width)], ())
+    assert predicting.purpose == "predict a new specimen"
+    assert predicting.verdict is verdict
+    assert f"its stress known to ± {100 * width:.0f} %" in predicting.reason
+
+
+def test_with_a_discrepancy_both_can_be_yes(monkeypatch):
+    found = population(MODULI, "constant")
+    carried = [0.1, 0.0, 0.2]
+    monkeypatch.setattr("tissuq.population.uses.shares_of_discrepancy", lambda _: ((0, 0, 0), carried))
+    assert [use.verdict for use in uses_of_population(found, [band(0.15)], ())] == [Verdict.YES, Verdict.YES]
+    carried[0] = 0.3
+    reporting, predicting = uses_of_population(found, [band(0.15)], ())
+    assert (reporting.verdict, predicting.verdict) == (Verdict.NO, Verdict.YES)
+    assert "carries 30 % of the initial stiffness" in reporting.reason
+
+
+@pytest.mark.parametrize("code", ["doubtful-reading", "stress-at-rest"])
+def test_what_is_wrong_with_measurements_stands_against_both(alike, code):
+    uses = uses_of_population(alike, [band(0.1)], (ResultWarning("x", code),))
+    assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
+
+
+def test_what_is_not_predicted_is_not_used(alike):
+    assert uses_of_population(alike, [], ())[1].verdict is Verdict.NO
+
+
+def test_few_specimens_say_little_of_a_new_one_and_one_in_another_unit_of_none():
+    few = population(MODULI[:3], "constant")
+    _, predicting = uses_of_population(few, [band(0.1)], ())
+    assert predicting.verdict is Verdict.CARE
+    assert "which 3 specimens determine no better than its prior" in predicting.reason
+    uses = uses_of_population(population([*MODULI[:3], 500.0]), [band(0.1)], ())
+    assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
+    assert "s3 differs from the others as much as by a mistaken unit" in uses[0].reason
