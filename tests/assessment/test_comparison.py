@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,6 +11,8 @@ from scipy.stats import norm
 
 import gallery
 import tissuq as tq
+from tissuq.assessment.comparison import warnings_of_evidence
+from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.moments import stress_moments
 from tissuq.report.comparison import comparison_warnings
 
@@ -107,6 +111,39 @@ def test_fits_of_other_data_and_single_fits_are_refused(fits):
         tq.compare({"none": fits["none"], "planar": planar})
     with pytest.raises(tq.InputError, match="no fit of measured stresses"):
         tq.compare({"none": fits["none"], "foreign": xr.DataTree()})
+
+
+@pytest.mark.parametrize(
+    ("evidences", "named"),
+    [
+        ({"a": (-3.0, 0.2), "b": (-3.25, 0.1), "c": (-9.0, 0.1)}, "whether a or b has"),
+        ({"a": (-3.0, 0.2), "b": (-3.25, 0.1), "c": (-3.2, 0.1)}, "whether a or b or c has"),
+        ({"a": (-3.0, 0.2), "b": (-3.5, 0.1)}, ""),  # differ by more
+        ({"a": (-3.0, 0.04), "b": (-3.01, 0.04)}, ""),  # are known well, and hardly differ
+        ({"a": (-3.0, np.nan), "b": (-3.5, np.nan), "c": (None, None)}, ""),
+        ({"a": (-3.0, np.inf), "b": (-8.0, 0.1)}, "whether a or b has"),
+        ({"a": (np.nan, np.nan)}, ""),
+    ],
+)
+def test_errors_of_integration_are_told_where_they_order_fits(evidences, named):
+    found = warnings_of_evidence(evidences)
+    assert len(found) == bool(named)
+    assert not named or (found[0].startswith(named) and found[0].code == "inaccurate-integral")
+
+
+def test_a_comparison_of_saved_fits_tells_of_their_errors(fits):
+    trees = {name: fits[name].data.copy() for name in ("yeoh", "taylor")}
+    assert not any("integration" in text for text in comparison_warnings(tq.compare(trees)))
+    apart = abs(fits["yeoh"].log_evidence - fits["taylor"].log_evidence)
+    trees["taylor"].attrs["log_evidence_error"] = apart + 0.2
+    assert any("the error of the integration is" in text for text in comparison_warnings(tq.compare(trees)))
+
+
+@pytest.mark.parametrize(("error", "is_told"), [(0.3, False), (1.0, True), (np.inf, True)])
+def test_errors_of_the_evidence_are_a_warning_of_one_fit_where_its_intervals_suffer(fits, error, is_told):
+    solution = replace(fits["taylor"].solution, log_evidence_error=error)
+    told = [warning.code for warning in warnings_about(solution, {}, np.ones(len(DATA), dtype=bool))]
+    assert ("inaccurate-integral" in told) == is_told
 
 
 def test_the_same_measurements_in_two_units_are_compared(fits):

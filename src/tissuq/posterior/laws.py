@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.assessment.comparison import warnings_of_evidence
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.drawing.panels import panels
@@ -33,6 +34,7 @@ from tissuq.posterior.least_squares import LeastSquares, least_squares
 from tissuq.posterior.plots import ROW
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predict_bands
+from tissuq.result_warning import ResultWarning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -179,6 +181,13 @@ class LawComparison:
             raise InputError("no fit has an evidence, by which laws are weighted: use the method 'auto' or 'exact'.")
         weights = np.nan_to_num(np.exp(evidences - np.nanmax(evidences)))
         return dict(zip(log_evidences, (weights / weights.sum()).tolist(), strict=True))
+
+    @property
+    def warnings_of_evidence(self) -> tuple[ResultWarning, ...]:
+        """The warning that errors of the integration may order the laws, if they may."""
+        return warnings_of_evidence(
+            {name: (fit.log_evidence, fit.log_evidence_error) for name, fit in self.fits.items()}
+        )
 
     @cached_property
     def modulus(self) -> Marginal:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.assessment.comparison import warnings_of_evidence
 from tissuq.drawing.pieces import forest, rows
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.experiments.units import StressUnit
@@ -74,7 +75,8 @@ def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]
 
 def comparison_warnings(table: pd.DataFrame) -> list[str]:
     """Return the warnings about a comparison."""
-    warnings = []
+    evidences = zip(table["log_evidence"], table["log_evidence_error"], strict=True)
+    warnings: list[str] = [*warnings_of_evidence(dict(zip(map(str, table.index), evidences, strict=True)))]
     if table["is_rough"].any():
         warnings.append(
             "Numbers marked rough are not reliable: a few influential measurements dominate the importance weights."

@@ -100,7 +100,9 @@ class LawStudy:
             *of_recommended,
             *(text if text.severity is Severity.PROBLEM else text.as_note() for text in of_others),
         ]
-        return most_severe_first([*self.data_warnings, *measurement_warnings(self.experiment), *texts])
+        return most_severe_first(
+            [*self.data_warnings, *self.comparison.warnings_of_evidence, *measurement_warnings(self.experiment), *texts]
+        )
 
 
 def run_laws(

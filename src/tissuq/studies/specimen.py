@@ -12,6 +12,7 @@ from typing import Any
 
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.assessment.answer import Answer
+from tissuq.assessment.comparison import warnings_of_evidence
 from tissuq.assessment.measurements import labels_of_tests
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
@@ -81,7 +82,12 @@ class SpecimenStudy:
             {name: fit.warnings for name, fit in self.posteriors.items() if name != self.main}, named=True
         )
         beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
-        return most_severe_first([*self.data_warnings, *of_main, *measurement_warnings(self.experiment), *beside])
+        of_evidence = warnings_of_evidence(
+            {name: (fit.log_evidence, fit.log_evidence_error) for name, fit in self.posteriors.items()}
+        )
+        of_comparison = [warning.as_note() for warning in of_evidence]
+        of_data = measurement_warnings(self.experiment)
+        return most_severe_first([*self.data_warnings, *of_main, *of_data, *of_comparison, *beside])
 
     @property
     def main(self) -> str:
