@@ -89,6 +89,13 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
     for name, end in (("value", "median"), ("low", "hdi_low"), ("high", "hdi_high")):
         assert headline[name] == pytest.approx(2 * float(patient[end]), rel=1e-6)  # the modulus is twice C10
     assert headline["unit"] == "kPa"
+    median = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "median")
+    half_width = (float(median["hdi_high"]) - float(median["hdi_low"])) / 2 / float(median["median"])
+    reporting, predicting = contents["result"]["uses"]
+    assert reporting["purpose"] == "report the modulus of the tissue"
+    assert f"known to ± {100 * half_width:.0f} %" in reporting["reason"]
+    assert predicting["purpose"] == "predict a new specimen"
+    assert "WITH CARE  report the modulus of the tissue" in said.out
 
 
 @pytest.mark.slow

@@ -12,6 +12,8 @@ from scipy.special import logsumexp
 from scipy.stats import norm, truncnorm
 
 import tissuq as tq
+from tissuq.assessment.uses import Use, Verdict
+from tissuq.population.uses import PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report import population
 from tissuq.report.population import _next_step
@@ -451,6 +453,8 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert _next_step(population, [without_unit]).startswith("say what the files do not")
     population.posteriors.pop("soft")
     assert "finite elements" in _next_step(population, [])
+    useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
+    assert "--aim 20%" in _next_step(population, [], uses=useless)
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
     assert _next_step(population, []).startswith("find out why the specimens differ so much")
 

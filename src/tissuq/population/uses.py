@@ -14,7 +14,9 @@ from tissuq.population.warnings import far_specimens, has_few_specimens
 from tissuq.prediction.bands import Band
 from tissuq.result_warning import has_code
 
-__all__ = ["uses_of_population"]
+__all__ = ["PREDICTING", "uses_of_population"]
+
+PREDICTING = "predict a new specimen"
 
 
 def uses_of_population(
@@ -35,7 +37,7 @@ def uses_of_population(
     against = _reason_against(population, warnings)
     return (
         Use(f"report the {quantity} of the tissue", *((Verdict.NO, against) if against else _reporting(population))),
-        Use("predict a new specimen", *((Verdict.NO, against) if against else _predicting(population, bands))),
+        Use(PREDICTING, *((Verdict.NO, against) if against else _predicting(population, bands))),
     )
 
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.assessment.extent import has_energy, shares_of_discrepancy
-from tissuq.assessment.uses import PRECISE
+from tissuq.assessment.uses import PRECISE, Use, Verdict
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import uses_of_population
+from tissuq.population.uses import PREDICTING, uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.population_figures import MODULUS, Bands, headline, headline_figure, patient_figure, specimens_figure
@@ -112,18 +112,16 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
     count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
     modes = ", ".join(mode.name for mode in study.modes)
-    words = headline(population)[0]
+    words, predicted = headline(population)[0], [_band(of_mode) for of_mode, _ in bands.values()]
+    uses = uses_of_population(population, predicted, study.warnings, "modulus" if words == MODULUS else words)
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
-        uses=uses_of_population(
-            population, [_band(of_mode) for of_mode, _ in bands.values()], study.warnings,
-            "modulus" if words == MODULUS else words,
-        ),
-        next_step=_next_step(population, study.warnings, settings.without),
+        uses=uses,
+        next_step=_next_step(population, study.warnings, settings.without, uses),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
@@ -140,7 +138,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     )  # fmt: skip
 
 
-def _next_step(population: Population, warnings: Sequence[str], already_without: Sequence[str] = ()) -> str:
+def _next_step(
+    population: Population, warnings: Sequence[str], already_without: Sequence[str] = (), uses: Sequence[Use] = ()
+) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
@@ -157,6 +157,11 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
         return (
             "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
             "compute with a new one"
+        )
+    if any(use.purpose == PREDICTING and use.verdict is Verdict.NO for use in uses):
+        return (
+            "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
+            "sets them apart (--covariates)"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
