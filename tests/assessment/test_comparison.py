@@ -142,8 +142,21 @@ def test_a_comparison_of_saved_fits_tells_of_their_errors(fits):
 @pytest.mark.parametrize(("error", "is_told"), [(0.3, False), (1.0, True), (np.inf, True)])
 def test_errors_of_the_evidence_are_a_warning_of_one_fit_where_its_intervals_suffer(fits, error, is_told):
     solution = replace(fits["taylor"].solution, log_evidence_error=error)
-    told = [warning.code for warning in warnings_about(solution, {}, np.ones(len(DATA), dtype=bool))]
-    assert ("inaccurate-integral" in told) == is_told
+    warnings = warnings_about(solution, {}, np.ones(len(DATA), dtype=bool))
+    told = [warning for warning in warnings if warning.code == "inaccurate-integral"]
+    assert bool(told) == is_told
+
+
+@pytest.mark.parametrize(("discrepancy", "is_advised"), [("constant", True), ("taylor", False)])
+def test_sampling_is_advised_where_it_is_not_refused(discrepancy, is_advised):
+    """Beside an energy it is."""
+    solution = replace(tq.fit(DATA, discrepancy=discrepancy).solution, log_evidence_error=1.0, diagnostics=None)
+    (told,) = (
+        warning
+        for warning in warnings_about(solution, {}, np.ones(len(DATA), dtype=bool))
+        if warning.code == "inaccurate-integral"
+    )
+    assert ("method='nuts'" in told) == is_advised
 
 
 def test_the_same_measurements_in_two_units_are_compared(fits):

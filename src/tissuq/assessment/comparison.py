@@ -315,8 +315,7 @@ def warnings_of_evidence(evidences: Mapping[str, tuple[float | None, float | Non
         ResultWarning(
             f"whether {best} or {' or '.join(doubtful)} has the most evidence is not known: the log evidences differ "
             f"by {known[best] - known[widest]:.2g}, and the error of the integration is {error_beside_best(widest):.2g}"
-            f" ({widest}). Do not choose by their probabilities, but by how they predict left-out measurements; or "
-            "sample (--method smc, in Python method='smc').",
+            f" ({widest}). Do not choose by their probabilities, but by how they predict left-out measurements.",
             "inaccurate-integral",
         ),
     )

@@ -105,7 +105,8 @@ def warnings_about(
     if error is not None and not error <= MAX_LOG_EVIDENCE_ERROR and solution.diagnostics is None:
         size = f"about {error:.1g}" if isfinite(error) else "unknown"
         remedy = (
-            "Give priors that hold less of what the data exclude, or sample (--method nuts, in Python method='nuts')."
+            "Give priors that hold less of what the data exclude"
+            + ("." if has_energy(solution.model) else ", or sample (--method nuts, in Python method='nuts').")
             if solution.model.noise.parameters
             else "This happens when the given noise is far smaller than the scatter of the data: give a larger noise, "
             "or leave it unknown."
