@@ -30,9 +30,9 @@ PRIOR_BOUND_REACHED = "the posterior is truncated by a prior bound"
 
 MIN_VARIANCE_SHARE = 0.1
 """Share of the joint variance below which noise or discrepancy may vanish (at the 5 % quantiles of the draws)."""
-MAX_LOG_EVIDENCE_ERROR = float(np.log(2))
-"""Error of the log evidence, by integration, above which as much of the posterior may be missing as was found: then its
-intervals suffer. Comparisons by evidence warn of smaller ones where these decide."""
+MAX_LOG_EVIDENCE_ERROR = 0.3
+"""Error of the log evidence, by integration, above which a quarter of the posterior may be missing, and intervals with
+it. Comparisons by evidence warn of smaller ones where these decide."""
 MAX_RELATIVE_WIDTH = 1.0
 """Width of the headline parameter's 95 % interval, over its median, above which it is poorly determined."""
 MIN_STABLE_PROBABILITY = 0.5
