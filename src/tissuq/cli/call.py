@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -21,6 +22,7 @@ from tissuq.studies.settings import load_settings
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.report.result import Record, Result
+    from tissuq.studies.model_settings import ModelSettings
 
 __all__ = ["Call", "not_converged"]
 
@@ -104,6 +106,35 @@ class Call(Generic[Kind, How]):
         if not (source or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
 
+    def check_named_again(self, settings: ModelSettings, *, is_dry: bool = False) -> None:
+        """Refuse to run programs, to ask servers or to read files elsewhere that only a recipe names.
+
+        Raises
+        ------
+        InputError
+            When the command line does not name them, too; the message has the options to type.
+        """
+        from tissuq.mechanics.user_law import UserCode
+        from tissuq.studies.settings import is_inside
+
+        if self.config is None:
+            return
+        programs = {name: getattr(settings, name, None) for name in ("forward", "umbridge", "command")}
+        missing = [f"--{name} {shlex.quote(text)}" for name, text in programs.items()
+                   if text and not self.stated.get(name)]  # fmt: skip
+        for setting, option in (("quantities", "--qoi"), ("along", "--along")):
+            for name, text in getattr(settings, setting, {}).items():
+                if UserCode.named(text) and name not in self.stated.get(setting, {}):
+                    missing.append(f"{option} {shlex.quote(f'{name}={text}')}")
+        missing, inside = [] if is_dry else missing, self.beside.resolve()
+        if "also" not in self.stated and not all(is_inside(inside / file, inside) for file in settings.also):
+            missing += [f"--also {shlex.quote(file)}" for file in settings.also]
+        if missing:
+            raise InputError(
+                f"'{self.config}' names programs that would be run, a server, or files outside of its folder. They are "
+                f"used only if named here, too; if you know them, add {' '.join(missing)}."
+            )
+
     @cached_property
     def law(self) -> Material | None:
         """The user's own law that a run is of."""
@@ -147,15 +178,18 @@ class Call(Generic[Kind, How]):
         steps : int, optional
             Their number, where it is known.
         """
+        from tissuq.report.run_folder import run_folder
         from tissuq.report.writer import write_result
 
-        records: list[Record] = []
-
-        def write(study: Study, *, folder: Path, figures: bool) -> None:
-            records.append(write_result(result_of(study), folder, figures=figures, target=target))
-
-        study = self.written(target, run, write, steps)
-        self._show(records[0], target)
+        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        with self.monitor.steps(steps) as step:
+            study = run(step)
+            step("writing")
+            with run_folder(target, self.command, force=self.how.force) as folder:
+                result = result_of(study)
+                record = write_result(result, folder, figures=self.how.figures, target=target)
+                self.monitor.write_log(folder, result.warnings)
+        self._show(record, target)
         return study
 
     def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
@@ -177,25 +211,6 @@ class Call(Generic[Kind, How]):
         for number in numbers if self.monitor.is_quiet else ():
             remark = f", {number['remark']}" if number["remark"] else ""
             print(f"{number['name']}: {number['text']}{remark}", file=self.out)
-
-    def written(
-        self,
-        target: Path,
-        run: Callable[[Callable[[str], None]], Study],
-        write: Callable[..., None],
-        steps: int | None = None,
-    ) -> Study:
-        """Return what a run gives, once ``write`` has put it into a ``folder``, with ``figures`` or without."""
-        from tissuq.report.run_folder import run_folder
-
-        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
-        with self.monitor.steps(steps) as step:
-            study = run(step)
-            step("writing")
-            with run_folder(target, self.command, force=self.how.force) as folder:
-                write(study, folder=folder, figures=self.how.figures)
-                self.monitor.write_log(folder, getattr(study, "warnings", ()))
-        return study
 
 
 def _shown(files: Any) -> str:

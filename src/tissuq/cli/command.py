@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext, redirect_stdout
+from dataclasses import replace
 from importlib import import_module
 from inspect import Parameter, Signature
 from io import StringIO
@@ -14,9 +15,8 @@ import typer
 from typer.core import TyperCommand
 
 from tissuq.cli.call import Call
-from tissuq.cli.progress import Monitor
+from tissuq.cli.progress import Monitor, stopping
 from tissuq.cli.running import Running, Verbosity
-from tissuq.cli.stopping import stopping
 from tissuq.studies.option import Settings, Slot, slots_of, stated
 from tissuq.studies.settings import load_settings
 
@@ -63,7 +63,7 @@ CONFIGURED: dict[str, tuple[type[Settings], str]] = {}
 
 
 def command(
-    settings: type[Kind], running: type[How], whole: str = ""
+    settings: type[Kind], running: type[How], whole: str = "", out: str = ""
 ) -> Callable[[Callable[[Call[Kind, How]], None]], Any]:
     """Make a command of what carries out a `Call`.
 
@@ -75,12 +75,16 @@ def command(
         Its other options.
     whole : str
         MODULE:NAME of the class of what its file may hold, where that is more than its options.
+    out : str
+        The help of ``--out``, where the folder is called or used in another way than runs are.
     """
 
     def decorate(carry_out: Callable[[Call[Kind, How]], None]) -> Any:
         has_config = "config" in running.model_fields
         of_settings = list(slots_of(settings, is_optional=has_config))
         of_running = [slot.in_group("Running") for slot in slots_of(running)]
+        if out:
+            of_running = [replace(slot, help=out) if slot.name == "out" else slot for slot in of_running]
 
         def run(**values: Any) -> None:
             how, typed_how = stated(of_running, values)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.running import Verbosity
+from tissuq.cli.running import IntoFolder, Verbosity
 from tissuq.errors import InputError
-from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option import Settings, argument
 from tissuq.studies.settings import DAMAGE
 
 if TYPE_CHECKING:
@@ -25,14 +25,11 @@ class ComparedRuns(Settings):
     runs: tuple[Path, ...] = argument(..., "Run folders, or files of posteriors in them.", takes=list[Path])
 
 
-class CompareOptions(Verbosity):
+class CompareOptions(IntoFolder, Verbosity):
     """Where a comparison is written, if at all."""
 
-    out: Path | None = option(None, "Folder for table, figure and report.")
-    force: bool = option(False, "Replace an existing folder of the same kind.")
 
-
-@command(ComparedRuns, CompareOptions)
+@command(ComparedRuns, CompareOptions, out="Folder for table, figure and report.")
 def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits

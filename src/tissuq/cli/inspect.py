@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tissuq.cli.ask import ask_about
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.running import Running
+from tissuq.cli.running import IntoFolder
 from tissuq.errors import InputError
 from tissuq.studies.files_of_tests import files_of, find_tests
 from tissuq.studies.measured_file import ReadingSettings
@@ -30,16 +30,14 @@ class InspectedFiles(ReadingSettings):
     )
 
 
-class InspectOptions(Running):
+class InspectOptions(IntoFolder):
     """What is made of what was understood."""
 
     write: Path | None = option(None, "Write what was understood into this TOML file, to edit and to fit.")
     ask: bool = option(False, "Ask where files leave a choice, and write what was understood [study.toml].")
-    out: Path | None = option(None, "Folder for figure, converted data and what is printed.")
-    force: bool = option(False, "Replace an existing folder of the same kind.")
 
 
-@command(InspectedFiles, InspectOptions)
+@command(InspectedFiles, InspectOptions, out="Folder for figure, converted data and what is printed.")
 def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     """Show what is understood of files of measurements: tests, columns, dimensions, cycles, rows, noise, warnings."""
     from tissuq.experiments.reading.inspection import Inspection, overview

@@ -47,7 +47,6 @@ class CalibrationSettings(ModelSettings):
         "CSV or Excel file with a column of controls and one of measured values (with several --qoi one of each name); "
         "of several experiments a file each.",
         takes=list[Path],
-        parse=lambda paths: tuple(map(str, paths)),
         min_length=1,
     )
     forward: str | None = option(
@@ -60,7 +59,6 @@ class CalibrationSettings(ModelSettings):
         "Instead: your finite-element model, a deck as of tissuq ensemble; of several files one each, in their order.",
         name="model",
         takes=list[Path],
-        parse=lambda paths: tuple(map(str, paths)),
         group=OWN,
     )
     replaced: tuple[str, ...] = option(
@@ -107,7 +105,6 @@ class CalibrationSettings(ModelSettings):
         None,
         "Run folder of tissuq fit: the priors of the parameters of --material are its posterior.",
         takes=Path,
-        parse=str,
     )
     control: str | int | None = option(
         None, "Column of the control [the first of two; with several --qoi the only other one].", parse=column

@@ -39,7 +39,6 @@ class ModelSettings(Settings):
         default_factory=list,
         help="Another file that the solver needs beside the deck; repeat for more.",
         takes=list[Path],
-        parse=lambda files: list(map(str, files)),
         group=GROUP,
     )
 
@@ -67,7 +66,6 @@ class EnsembleSettings(ModelSettings):
         ...,
         "Your model: a deck of CalculiX or Abaqus (.inp), FEBio (.feb), LS-DYNA (.k), ANSYS (.cdb).",
         takes=Path,
-        parse=str,
     )
     materials: dict[str, str] = option(
         ...,
@@ -92,7 +90,7 @@ class EnsembleSettings(ModelSettings):
     seed: int = seed()
     finer_model: str | None = option(
         None, "The same model with a finer mesh: one draw is run on it, too, for the error of the mesh.",
-        takes=Path, parse=str, group=MESH,
+        takes=Path, group=MESH,
     )  # fmt: skip
     cell_ratio: float | None = option(
         None, "How many times smaller its elements are [by their number].", gt=1, lt=inf, group=MESH

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from importlib import import_module
+from pathlib import Path
 from types import NoneType
 from typing import Any, Self, get_args, get_origin
 
@@ -18,6 +19,14 @@ class Settings(BaseModel):
     """Settings whose fields are declared by `option` and `argument`, or are for files alone."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _paths_as_text(cls, value: Any) -> Any:
+        """Take the paths of the command line as files of settings have them."""
+        if isinstance(value, list):
+            return [str(item) if isinstance(item, Path) else item for item in value]
+        return str(value) if isinstance(value, Path) else value
 
     @field_validator("*")
     @classmethod
@@ -98,7 +107,7 @@ class Option:
             return list[int] if get_args(kind)[0] is int else list[str]
         if get_origin(kind) is dict or kind is dict:
             return list[str]
-        return kind if kind in (int, float, bool, str) or _is_path(kind) else str
+        return kind if kind in (int, float, bool, str, Path) else str
 
     def explained(self, info: FieldInfo) -> str:
         """Return the help with the default."""
@@ -106,38 +115,16 @@ class Option:
         is_shown = isinstance(default, int | float | str) and not isinstance(default, bool) and default != ""
         if not is_shown or not self.help or "[" in self.help:
             return self.help
-        return f"{self.help.removesuffix('.')} [{default:g}]." if isinstance(default, float) else (
-            f"{self.help.removesuffix('.')} [{default}]."
-        )  # fmt: skip
-
-
-def _is_path(kind: Any) -> bool:
-    from pathlib import Path
-
-    return kind is Path
+        shown = f"{default:g}" if isinstance(default, float) else default
+        return f"{self.help.removesuffix('.')} [{shown}]."
 
 
 def option(
-    default: Any = None,
-    help: str = "",
-    *,
-    name: str = "",
-    negative: str = "",
-    letter: str = "",
-    unit: str = "",
-    takes: Any = None,
-    parse: Callable[[Any], Any] | None = None,
-    choices: str = "",
-    entry: str = "",
-    entries: Mapping[str, str] | None = None,
-    of: type[BaseModel] | None = None,
-    renamed: Mapping[str, str] | None = None,
-    group: str = "",
-    default_factory: Callable[[], Any] | None = None,
-    is_argument: bool = False,
-    **limits: Any,
+    default: Any = None, help: str = "", *, default_factory: Callable[[], Any] | None = None, **more: Any
 ) -> Any:
-    """Declare a setting that is an option of the command line; ``limits`` are those of pydantic's ``Field``.
+    """Declare a setting that is an option of the command line.
+
+    ``more`` are fields of `Option`, and the limits of its values, which are those of pydantic's ``Field``.
 
     Examples
     --------
@@ -146,24 +133,9 @@ def option(
     >>> Throw().draws, [option.explained(info) for _, option, info in options_of(Throw)]
     (64, ['Number of draws [64].'])
     """
-    declared = Option(
-        help,
-        name,
-        negative,
-        letter,
-        unit,
-        takes,
-        parse,
-        choices,
-        entry,
-        entries or {},
-        of,
-        renamed or {},
-        group,
-        is_argument,
-    )
+    declared = {name: more.pop(name) for name in [entry.name for entry in fields(Option)] if name in more}
     start = {"default": default} if default_factory is None else {"default_factory": default_factory}
-    return Field(**start, description=help or None, json_schema_extra=declared, **limits)
+    return Field(**start, description=help or None, json_schema_extra=Option(help, **declared), **more)
 
 
 def argument(default: Any, help: str, **more: Any) -> Any:

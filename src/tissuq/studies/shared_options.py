@@ -18,7 +18,7 @@ __all__ = ["RunSettings", "mesh_order", "sampling", "seed"]
 class RunSettings(Settings):
     """What is done with a run of ``tissuq fit``."""
 
-    run: str = argument(..., "Run folder of tissuq fit.", takes=Path, parse=str)
+    run: str = argument(..., "Run folder of tissuq fit.", takes=Path)
     material: str | None = option(None, "Which of the laws of the run, where it compared several.")
     discrepancy: str | None = option(None, "Which of the discrepancies of the run [auto, or the only one].")
 

@@ -76,7 +76,7 @@ class SimulationSettings(RunSettings):
 
     mesh: str | None = option(
         None, "Instead of a case: a file of a mesh (.msh, .inp, .vtu and others that meshio reads; in mm).",
-        takes=Path, parse=str, group=BODY,
+        takes=Path, group=BODY,
     )  # fmt: skip
     hold: dict[str, str] = option(
         default_factory=dict,
@@ -105,7 +105,7 @@ class SimulationSettings(RunSettings):
     shape: str | None = option(None, "axisymmetric (around y) or plane (strain), of a mesh in a plane.", group=BODY)
     finer_mesh: str | None = option(
         None, "The same body with smaller cells: one draw is computed on it, too, for the error of the mesh.",
-        takes=Path, parse=str, group=BODY,
+        takes=Path, group=BODY,
     )  # fmt: skip
     mesh_order: float | None = mesh_order(BODY)
     parts: float = option(1.0, "Such bodies, by symmetry, that bear the force side by side.", gt=0, lt=inf, group=BODY)
