@@ -51,7 +51,7 @@ def predict(call: Call[PredictionSettings, OfRun]) -> None:
 def design(call: Call[DesignSettings, OfRun]) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
     from tissuq.report.design import design_result
-    from tissuq.report.answer_of_run import said_by
+    from tissuq.report.source_run import said_by
     from tissuq.studies.design import run_design
     from tissuq.studies.ensemble_target import with_folder
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
-from tissuq.emulation import Calibration, DeckForward, FileForward, SeveralModels
+from tissuq.emulation import Calibration, DeckForward, SeveralModels
 from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
+from tissuq.report.inputs import Copies
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, known_number, significant
@@ -57,7 +58,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     """
     calibration, settings = study.calibration, study.settings
     copies, relocated = _copies(study, beside)
-    files = copies | _tables(study) | {"calibration.nc": calibration.save}
+    files = copies.files | _tables(study) | {"calibration.nc": calibration.save}
     if study.posterior is not None:
         files |= posterior_files({NoDiscrepancy.name: study.posterior})
     model, runs = study.forward.name, len(calibration.runs)
@@ -132,24 +133,27 @@ def _next_step(study: CalibrationStudy) -> str:
     )
 
 
-def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the user's files, so that the run can be repeated, and the settings that name the copies."""
-    sources = [beside / file for file in study.settings.files]
-    folders = _folders(len(sources))
-    copies: dict[str, Any] = {
-        f"{folder}/{source.name}": source for folder, source in zip(folders, sources, strict=True)
-    }
-    relocated: dict[str, Any] = {"files": tuple(copies)}
-    if decks := _decks(study):
-        of_models, relocated_models = _model_copies(decks, study.settings, beside)
-        return copies | of_models, relocated | relocated_models
-    if study.settings.forward is None:
-        return copies, relocated
-    match, file = LAW.fullmatch(study.settings.forward), FileForward(study.settings.forward).file
-    if match and file:
-        copies[f"{INPUT}/{file.name}"] = file
-        return copies, relocated | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
-    return copies, relocated | {"forward": study.settings.forward}
+def _copies(study: CalibrationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:
+    """Return copies of the user's files, so that the run can be repeated, and the settings that name them."""
+    settings, copies, decks = study.settings, Copies(), _decks(study)
+    folders = _folders(len(settings.files))
+    files = [copies.of_file(beside / file, folder) for file, folder in zip(settings.files, folders, strict=True)]
+    relocated: dict[str, Any] = {"files": tuple(files)}
+    if not decks:
+        return copies, relocated | ({"forward": copies.of_code(settings.forward)} if settings.forward else {})
+    models, also_copies = list[str](), list[str]()
+    for folder, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
+        deck, stored = forward.read_deck, f"{folder}/{MODEL}"
+        of_model = {name: deck.root / name for name in deck.files} | extra_files(deck, forward.also, Path())
+        copies.files |= {f"{stored}/{name}": file for name, file in of_model.items()}
+        models.append(f"{stored}/{deck.main}")
+        also = [stored_place(deck, Path(file)) for file in forward.also]
+        also_copies += [file if Path(file).is_absolute() else f"{folder}/{file}" for file in also]
+    relocated |= {"models": tuple(models), "also": list(dict.fromkeys(also_copies))}
+    for setting in ("quantities", "along"):
+        texts = getattr(settings, setting)
+        relocated[setting] = {name: copies.of_code(located(text, beside)) for name, text in texts.items()}
+    return copies, relocated
 
 
 def _folders(count: int) -> list[str]:
@@ -163,30 +167,6 @@ def _decks(study: CalibrationStudy) -> list[tuple[tuple[str, ...], DeckForward]]
         return [(tuple(study.data), study.forward)]
     models = study.forward.models if isinstance(study.forward, SeveralModels) else ()
     return [(names, model) for names, model in models if isinstance(model, DeckForward)]
-
-
-def _model_copies(
-    decks: list[tuple[tuple[str, ...], DeckForward]], settings: CalibrationSettings, beside: Path
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the files of finite-element models and of functions, and the settings that name their copies."""
-    copies, models, also_copies = dict[str, Any](), list[str](), list[str]()
-    for folder, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
-        deck, stored = forward.read_deck, f"{folder}/{MODEL}"
-        copies |= {f"{stored}/{name}": deck.root / name for name in deck.files}
-        copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
-        models.append(f"{stored}/{deck.main}")
-        also = [stored_place(deck, Path(file)) for file in forward.also]
-        also_copies += [file if Path(file).is_absolute() else f"{folder}/{file}" for file in also]
-    relocated: dict[str, Any] = {"models": tuple(models), "also": list(dict.fromkeys(also_copies))}
-    for setting in ("quantities", "along"):
-        texts = dict(getattr(settings, setting))
-        for name, text in texts.items():
-            if match := LAW.fullmatch(located(text, beside)):
-                file = Path(match["path"])
-                copies[f"{INPUT}/{file.name}"] = file
-                texts[name] = f"{INPUT}/{file.name}:{match['name']}"
-        relocated[setting] = texts
-    return copies, relocated
 
 
 def _tables(study: CalibrationStudy) -> dict[str, Any]:

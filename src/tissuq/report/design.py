@@ -13,8 +13,8 @@ from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_fi
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.candidates import Target
 from tissuq.next_test.ranking import TIED
-from tissuq.report.answer_of_run import said_by
 from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.source_run import said_by
 from tissuq.report.tables import Row, significant
 from tissuq.studies.design import DesignSettings, DesignStudy
 

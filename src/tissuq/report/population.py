@@ -15,16 +15,16 @@ from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.population.picture import numbers_of
 from tissuq.population.warnings import far_specimens
+from tissuq.report.inputs import Copies
 from tissuq.report.population_figures import Bands, headline, headline_figure, patient_figure, specimens_figure
 from tissuq.report.population_tables import (
-    copy_of_covariates,
     effects_of_covariates,
     needed_of,
     needed_table_of,
     patient_in_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT, law_files
+from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.result_warning import has_code
@@ -40,6 +40,8 @@ __all__ = ["HEADERS", "population_result", "readable_population"]
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""
+COVARIATES = "covariates-of-specimens"
+"""The name of the table of covariates in a run's folder."""
 ENDS = ("hdi_low", "hdi_high")
 NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of specimens."
 SPECIMENS = (
@@ -93,9 +95,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         Where the files of the settings lie, unless they are absolute.
     """
     population, unit, settings = study.population, study.unit, study.settings
-    sources, names = _copies(study, beside)
-    of_covariates, relocated = copy_of_covariates(study, beside)
-    law, laws = law_files(settings.material)
+    copies, relocated = _copies(study, beside)
+    law = relocated["material"]
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
@@ -128,8 +129,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),
-        files=files | sources | of_covariates | laws | posterior_files({PATIENT: population.patient}),
-        recipe=settings.model_copy(update={"files": names, "material": law, **relocated}),
+        files=files | copies.files | posterior_files({PATIENT: population.patient}),
+        recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 
 
@@ -291,15 +292,19 @@ def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFra
     return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
 
 
-def _copies(study: PopulationStudy, beside: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the user's files, so that the run can be repeated, and what names them there."""
-    copies: dict[str, Any] = {}
-    for name, files in study.settings.sources(beside).items():
+def _copies(study: PopulationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:
+    """Return copies of the user's files, so that the run can be repeated, and the settings that name them."""
+    settings, copies = study.settings, Copies()
+    for name, files in settings.sources(beside).items():
         is_folder = len(files) > 1 or files[0].stem != name
         for file in files:
-            copies[f"{INPUT}/{name}/{file.name}" if is_folder else f"{INPUT}/{file.name}"] = file
-    is_one_file = study.settings.specimen is not None
-    return copies, (f"{INPUT}/{Path(study.settings.files[0]).name}" if is_one_file else INPUT,)
+            copies.of_file(file, f"{INPUT}/{name}" if is_folder else INPUT)
+    sources = INPUT if settings.specimen is None else f"{INPUT}/{Path(settings.files[0]).name}"
+    relocated: dict[str, Any] = {"files": (sources,), "material": copies.of_law(settings.material)}
+    if settings.covariates is not None:
+        table = beside / settings.covariates
+        relocated["covariates"] = copies.of_file(table, name=f"{COVARIATES}{table.suffix}")
+    return copies, relocated
 
 
 def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:

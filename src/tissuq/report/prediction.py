@@ -15,7 +15,7 @@ from tissuq.assessment.uses import UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
-from tissuq.report.answer_of_run import uses_of
+from tissuq.report.inputs import Copies
 from tissuq.report.measured import named
 from tissuq.report.prediction_tables import (
     MAX_ROWS,
@@ -30,8 +30,8 @@ from tissuq.report.prediction_tables import (
     share_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT
-from tissuq.report.stability import SAME_STATES
+from tissuq.report.source_run import uses_of
+from tissuq.report.summary import SAME_STATES
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
 
@@ -87,12 +87,11 @@ def prediction_result(
     law : str, optional
         The material that was named, where it is a law in the user's file.
     """
+    copies = Copies()
     relocated: dict[str, Any] = {"run": os.path.relpath(beside / settings.run, target), "mode": prediction.mode.name}
     files: dict[str, Any] = {"prediction.csv": prediction.rows, "prediction.nc": prediction.save}
     if settings.data is not None:
-        source = beside / settings.data.file
-        files[f"{INPUT}/{source.name}"] = source
-        copy = {"file": f"{INPUT}/{source.name}", "mode": prediction.mode.name}
+        copy = {"file": copies.of_file(beside / settings.data.file), "mode": prediction.mode.name}
         relocated["data"] = settings.data.model_copy(update=copy)
     if prediction.scores is not None:
         rows = [{str(name): value for name, value in row.items()} for row in prediction.scores.to_dict("records")]
@@ -118,7 +117,7 @@ def prediction_result(
         tables=_tables(prediction),
         sections=_sections(prediction),
         warnings=tuple(prediction.warnings),
-        files=files,
+        files=files | copies.files,
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 

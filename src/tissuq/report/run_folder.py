@@ -37,7 +37,6 @@ __all__ = [
     "RECIPE",
     "check_apart",
     "check_target",
-    "law_files",
     "run_folder",
     "versions",
     "write_data",
@@ -281,16 +280,3 @@ def write_recipe(folder: Path, command: str, settings: BaseModel, without: froze
     plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
     header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")
-
-
-def law_files(material: str) -> tuple[str, dict[str, Path]]:
-    """Return the name of a material with the laws in the user's files as their copies are named, and these files."""
-    from tissuq.mechanics.user_law import LAW
-
-    terms, copies = material.split("+"), dict[str, Path]()
-    for index, match in enumerate(map(LAW.fullmatch, terms)):
-        if match:
-            law = Path(match["path"].strip())
-            copies[f"{INPUT}/{law.name}"] = law
-            terms[index] = f"{INPUT}/{law.name}:{match['name']}"
-    return "+".join(terms), copies

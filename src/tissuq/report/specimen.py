@@ -15,14 +15,21 @@ from tissuq.experiments.units import stress_unit
 from tissuq.pictures.curves import Described
 from tissuq.report.chart import chart_data
 from tissuq.report.figures import answer_figure, described_curves, marginal_figure, predictive_figure
-from tissuq.report.held_out import held_out_files, held_out_table
 from tissuq.report.inputs import inputs_of
-from tissuq.report.measured import computed_section, data_section, named, subject_of
-from tissuq.report.methods import methods_section
+from tissuq.report.measured import computed_section, data_section, methods_section, named, subject_of
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import ASSESSMENT
-from tissuq.report.stability import stability_cells, stability_rows, stability_section
-from tissuq.report.summary import parameter_table, summary_row, summary_table, summary_tables
+from tissuq.report.summary import (
+    held_out_files,
+    held_out_table,
+    parameter_table,
+    stability_cells,
+    stability_rows,
+    stability_section,
+    summary_row,
+    summary_table,
+    summary_tables,
+)
 from tissuq.report.tables import Row, significant
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.specimen import SpecimenStudy
