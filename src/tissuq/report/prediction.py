@@ -18,18 +18,15 @@ from tissuq.errors import InputError
 from tissuq.report.inputs import Copies
 from tissuq.report.measured import named
 from tissuq.report.prediction_tables import (
-    MAX_ROWS,
-    band_headers,
+    band_table,
     end_words,
     kind_words,
     median_words,
-    readable_bands,
-    readable_scores,
-    score_headers,
+    score_table,
     scored_kind,
     share_words,
 )
-from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.result import Number, Picture, Result, Section
 from tissuq.report.source_run import uses_of
 from tissuq.report.summary import SAME_STATES
 from tissuq.result_warning import in_shell
@@ -99,6 +96,9 @@ def prediction_result(
         names = {name: f"{name} [{unit}]" for name in ("crps", "interval_score")}
         files["scores.csv"] = [{names.get(name, name): row[name] for name in row} for row in rows]
         files["scores.json"] = [row | {"unit": unit} for row in rows]
+    tables = [band_table(prediction)]
+    if prediction.scores is not None and prediction.data is not None:
+        tables.append(score_table(prediction, prediction.scores, prediction.data.name))
     model = prediction.posterior.model
     measured = " and ".join(f"{test.mode.name} ({len(test)} measurements)" for test in model.experiment.tests)
     run = Path(settings.run).name or settings.run
@@ -114,7 +114,7 @@ def prediction_result(
             "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
             f"Predicted bands of the stress in mode {prediction.mode.name}", _caption(prediction),
         ),
-        tables=_tables(prediction),
+        tables=tuple(tables),
         sections=_sections(prediction),
         warnings=tuple(prediction.warnings),
         files=files | copies.files,
@@ -181,22 +181,6 @@ def _caption(prediction: Prediction) -> str:
         f"Dark: {share} of the stress itself, noise off. Light: {share} of measurements of it. Hatched: an invariant "
         f"is larger than in any measurement of the run; there bands may run out of the panel.{deduced}"
     )
-
-
-def _tables(prediction: Prediction) -> tuple[Table, ...]:
-    several, unit = len(prediction.stresses) > 1, prediction.unit.name
-    text_column = (len(prediction.mode.controls),) if several else ()
-    alone_words = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
-    count = len(prediction.points)
-    excerpt = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
-    note = f"{unit}, {', '.join(prediction.stresses)}. {alone_words}{excerpt}".strip()
-    title = f"Stress in mode {prediction.mode.name}, {unit}"
-    tables = [Table(band_headers(prediction), readable_bands(prediction), title, text_column, note)]
-    if prediction.scores is not None and prediction.data is not None:
-        title = f"Measurements of {prediction.data.name}"
-        columns = (1, 2) if several else (1,)
-        tables.append(Table(score_headers(prediction), readable_scores(prediction), title, columns))
-    return tuple(tables)
 
 
 def _sections(prediction: Prediction) -> tuple[Section, ...]:
