@@ -6,10 +6,10 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Self, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
 
 import typer
 
@@ -85,10 +85,6 @@ class Call(Generic[Kind, How]):
     def loaded_as(self, kind: type[Whole], rivals: tuple[str, ...] = (), **changes: Any) -> Whole:
         """Return `loaded` settings of another class, which may add what only a file can say."""
         return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
-
-    def with_config(self, file: Path) -> Self:
-        """Return the call as if the file of settings had been named."""
-        return replace(self, how=self.how.model_copy(update={"config": file}))
 
     def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:
         """Return what shows the tasks of a campaign, which are kept in a folder as they are done."""

@@ -25,6 +25,7 @@ from tissuq.report.band_table import Bands, percent_of
 from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Picture, Preformatted, Result, Section, Table
 from tissuq.report.source_run import Said, said_by
+from tissuq.report.tables import known_number
 from tissuq.result_warning import merged
 from tissuq.studies.ensemble import DRAWS, EnsembleStudy
 
@@ -170,7 +171,10 @@ def _files(study: EnsembleStudy, bands: dict[str, Bands]) -> dict[str, Any]:
             "finer_model": _finer(study),
             "draws": result.draws,
             "failed": sum(failure.family == COMPLETE for failure in result.failures),
-            "quantities": {name: _plain(of_one.last) for name, of_one in bands.items()},
+            "quantities": {
+                name: {key: known_number(value) for key, value in of_one.last.items() if not key.startswith("noise")}
+                for name, of_one in bands.items()
+            },
             "measured_invariants": {name: list(ensemble.most) for name, ensemble in prepared.ensembles.items()},
             "elements_beyond": None if elements_beyond is None else float(np.nanmean(elements_beyond[1][:, -1])),
             "seconds": result.seconds,
@@ -229,10 +233,6 @@ def _curves(study: EnsembleStudy) -> xr.Dataset:
         for family, values in families.items():
             curves[name if family == COMPLETE else f"{name}_{family}"] = (("draw", f"time_{name}"), values)
     return xr.Dataset(curves, coordinates, {"model": study.prepared.settings.model})
-
-
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: None if value != value else float(value) for key, value in row.items() if not key.startswith("noise")}
 
 
 def _of_mesh(study: EnsembleStudy, bands: dict[str, Bands]) -> str:

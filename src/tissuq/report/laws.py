@@ -17,7 +17,7 @@ from tissuq.pictures.curves import points_along, ways_of
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.tables import in_unit_of, known_number, significant, with_named_units
+from tissuq.report.tables import known_number, significant, table_files
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.laws import LawStudy
 
@@ -54,21 +54,18 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         {"law": name} | {str(column): known_number(value) for column, value in row.items()}
         for name, row in comparison.table_in("MPa").iterrows()
     ]
-    inputs = inputs_of(settings, study.experiment, sources)
-    files = {
-        "laws.csv": with_named_units(rows, MODULUS, unit),
-        "laws.json": in_unit_of(rows, MODULUS, unit),
-    }
+    inputs, files = inputs_of(settings, study.experiment, sources), table_files("laws", rows, MODULUS, unit)
     discrepancy = settings.discrepancies[0]
     caption = (
         f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % interval, and the "
         "average by the laws' probabilities."
     )
-    law = study.recommended
+    law, names = study.recommended, list(comparison.fits)
+    laws = " and ".join([", ".join(names[:-1]), names[-1]])
     answer = comparison.fits[law].answer_with(study.data_warnings)
     return Result(
         command=f"fit{inputs.options}",
-        title=f"{named(study.experiment)}: which law of {_laws_in_words(list(study.comparison.fits))}",
+        title=f"{named(study.experiment)}: which law of {laws if len(names) <= FEW_LAWS else len(names)}",
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
@@ -90,10 +87,6 @@ def _next_step_with(law: str, answer: Answer) -> str:
     if "{run}" not in step.shell:
         return f"{step.shell} Its posterior: tissuq predict {{run}} --material {law} (export and design, too)"
     return step.shell.replace("{run}", f"{{run}} --material {law}")
-
-
-def _laws_in_words(names: list[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) <= FEW_LAWS else f"{len(names)}"
 
 
 def _numbers(study: LawStudy) -> tuple[Number, ...]:

@@ -59,16 +59,14 @@ def subject_of(experiment: Experiment) -> str:
 
 
 def tests_in_words(experiment: Experiment) -> list[str]:
-    """Return every test in a few words."""
-    return [_test_line(test) for test in experiment.tests]
-
-
-def _test_line(test: Experiment) -> str:
-    """Return a test in a few words: its mode, measurements and range."""
-    control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
-    specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
-    ends = f"{values.min():.4g} to {values.max():.4g}"
-    return f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}"
+    """Return every test in a few words: its mode, measurements and range."""
+    texts = []
+    for test in experiment.tests:
+        control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
+        specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
+        ends = f"{values.min():.4g} to {values.max():.4g}"
+        texts.append(f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}")
+    return texts
 
 
 def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Section:

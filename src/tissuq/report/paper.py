@@ -83,6 +83,8 @@ def paper_result(study: PaperStudy) -> Result:
     files |= {"sensitivity.csv": [vars(cell) for cell in study.cells], "claims.csv": _claims(study)}
     held = [row["formulation"] for row in summary if row["contains_truth"]]
     passed = [name for name, fit in study.main.items() if fit.finding.passes]
+    table = summary_table(summary, MPA, "The study of the paper: neo-Hookean C10 under seven formulations")
+    nuts = "NUTS gives no evidence. " * (settings.sampler == "nuts")
     return Result(
         command="paper",
         title="How much model uncertainty does a soft-tissue parameter need?",
@@ -98,7 +100,7 @@ def paper_result(study: PaperStudy) -> Result:
             "figure7", lambda: marginal_figure(main, "C10", MPA, settings.truth["C10"], ANSWER_WIDTH),
             "Marginal posteriors of C10 for seven formulations", FIGURE_7, is_slim=True,
         ),
-        tables=(_table(study, summary),),
+        tables=(replace(table, note=f"{table.note} {NOTE.format(nuts=nuts)}"),),
         sections=_sections(study),
         warnings=tuple(study.warnings),
         files=files,
@@ -124,12 +126,6 @@ def _numbers(summary: list[Row], held: list[str], passed: list[str]) -> tuple[Nu
     numbers.append(Number("intervals that hold the true C10", f"{len(held)} of {count}"))
     remark = "as many measurements inside their 95 % bands as chance allows, or more"
     return (*numbers, Number("pass the predictive check", f"{len(passed)} of {count}", remark=remark))
-
-
-def _table(study: PaperStudy, summary: list[Row]) -> Table:
-    table = summary_table(summary, MPA, "The study of the paper: neo-Hookean C10 under seven formulations")
-    nuts = "NUTS gives no evidence. " * (study.settings.sampler == "nuts")
-    return replace(table, note=f"{table.note} {NOTE.format(nuts=nuts)}")
 
 
 def _sections(study: PaperStudy) -> tuple[Section, ...]:

@@ -29,6 +29,7 @@ from tissuq.report.prediction_tables import (
 from tissuq.report.result import Number, Picture, Result, Section
 from tissuq.report.source_run import uses_of
 from tissuq.report.summary import SAME_STATES
+from tissuq.report.tables import table_files
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
 
@@ -41,6 +42,8 @@ __all__ = ["prediction_figure", "prediction_result"]
 
 FloatArray = NDArray[np.float64]
 
+SCORES = ("crps", "interval_score")
+"""Columns that are stresses."""
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
 
 
@@ -92,10 +95,7 @@ def prediction_result(
         relocated["data"] = settings.data.model_copy(update=copy)
     if prediction.scores is not None:
         rows = [{str(name): value for name, value in row.items()} for row in prediction.scores.to_dict("records")]
-        unit = prediction.unit.name
-        names = {name: f"{name} [{unit}]" for name in ("crps", "interval_score")}
-        files["scores.csv"] = [{names.get(name, name): row[name] for name in row} for row in rows]
-        files["scores.json"] = [row | {"unit": unit} for row in rows]
+        files |= table_files("scores", rows, SCORES, replace(prediction.unit, to_mpa=1.0))  # they are in it already
     tables = [band_table(prediction)]
     if prediction.scores is not None and prediction.data is not None:
         tables.append(score_table(prediction, prediction.scores, prediction.data.name))
@@ -107,7 +107,7 @@ def prediction_result(
         title=f"Predicted stress: {prediction.mode.name}, by {model.material.name} fitted to {named(model.experiment)}",
         subject=f"run {run}: {model.material.name}, discrepancy {model.discrepancy.name}, fitted to {measured}",
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
-        finding=_lead(prediction),
+        finding=_lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction),
         uses=_use_of_mode(prediction, beside / settings.run),
         next_step=_next_step(prediction, shlex.quote(os.path.normpath(beside / settings.run))),
         picture=Picture(
@@ -224,11 +224,6 @@ def _sections(prediction: Prediction) -> tuple[Section, ...]:
         words = f"{data.name}: {len(data)} measurements, {data.source}."
         sections.append(Section("The measurements", (words,)))
     return tuple(sections)
-
-
-def _lead(prediction: Prediction) -> str:
-    """Return the finding in a sentence or two."""
-    return _lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction)
 
 
 def _lead_of_scores(prediction: Prediction) -> str:

@@ -199,7 +199,10 @@ def write_page(folder: Path, **context: Any) -> None:
     """Write report.html from the template of a result, with the folder's recipe and figures; values are escaped."""
     recipe = folder / RECIPE
     context["recipe"] = recipe.read_text(encoding="utf-8") if recipe.exists() else ""
-    context["figures"] = {path.stem: _as_address(path) for path in sorted((folder / "figures").glob("*.svg"))}
+    figures = sorted((folder / "figures").glob("*.svg"))
+    context["figures"] = {
+        path.stem: f"data:image/svg+xml;base64,{b64encode(path.read_bytes()).decode('ascii')}" for path in figures
+    }
     page = _templates().get_template("result.html").render(versions=versions(), asset=_asset, **context)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
@@ -230,11 +233,6 @@ def _prose(text: str) -> Markup:
 def _asset(name: str) -> str:
     """Return a script or a style that goes into pages."""
     return (files("tissuq.report") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _as_address(figure: Path) -> str:
-    """Return an SVG file as a data address for an image in a page."""
-    return "data:image/svg+xml;base64," + b64encode(figure.read_bytes()).decode("ascii")
 
 
 def versions() -> dict[str, str]:

@@ -37,7 +37,6 @@ from tissuq.studies.specimen import SpecimenStudy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tissuq.posterior.posterior import Posterior
 
 __all__ = ["specimen_answer", "specimen_result"]
 
@@ -83,7 +82,11 @@ def specimen_answer(study: SpecimenStudy) -> Result:
 def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
     """Return what a fit says; ``sources`` are the files that were read, one a test."""
     inputs, unit, posteriors = inputs_of(study.settings, study.experiment, sources), study.unit, study.posteriors
-    summary = [_summary_row(study, name, posterior) for name, posterior in posteriors.items()]
+    summary = []
+    for name, posterior in posteriors.items():
+        more: Row = {"estimand": posterior.model.tolerances.estimand, "noise_lag": posterior.model.fitted_errors.lag}
+        more |= stability_cells(posterior)
+        summary.append(summary_row(name, posterior, study.seconds[name], more=more))
 
     @cache
     def computed() -> dict[str, Sequence[Described]]:
@@ -105,11 +108,6 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
         recipe=inputs.recipe,
         without=inputs.without,
     )
-
-
-def _summary_row(study: SpecimenStudy, name: str, posterior: Posterior) -> Row:
-    more: Row = {"estimand": posterior.model.tolerances.estimand, "noise_lag": posterior.model.fitted_errors.lag}
-    return summary_row(name, posterior, study.seconds[name], more=more | stability_cells(posterior))
 
 
 def _files(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:

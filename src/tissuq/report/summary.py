@@ -11,13 +11,12 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.report.result import Section, Table
 from tissuq.report.tables import (
     Row,
-    in_unit_of,
     interval,
     known_number,
     percent,
     significant,
     stretch_in_words,
-    with_named_units,
+    table_files,
 )
 
 __all__ = [
@@ -87,11 +86,6 @@ def summary_row(
     }
 
 
-def headline_columns(row: Row) -> list[str]:
-    """Return the columns of a row that begin with its headline parameter, in whose unit they are."""
-    return [name for name in row if name.startswith(f"{headline_of(row)}_")]
-
-
 def headline_of(row: Row) -> str:
     """Return the parameter whose posterior the row of a formulation gives."""
     names = [name.removesuffix("_mean") for name in row if name.endswith("_mean")]
@@ -126,12 +120,11 @@ def summary_tables(
     summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "", unit: StressUnit | None = None
 ) -> dict[str, list[Row]]:
     """Return summary.csv, summary.json and parameters.csv; the summary, in MPa, in a unit where one is said."""
-    columns = headline_columns(summary[0])
-    return {
-        f"summary{suffix}.csv": summary if unit is None else with_named_units(summary, columns, unit),
-        f"summary{suffix}.json": summary if unit is None else in_unit_of(summary, columns, unit),
-        f"parameters{suffix}.csv": parameter_rows(posteriors),
-    }
+    columns = [name for name in summary[0] if name.startswith(f"{headline_of(summary[0])}_")]
+    name, parameters = f"summary{suffix}", {f"parameters{suffix}.csv": parameter_rows(posteriors)}
+    if unit is None:
+        return {f"{name}.csv": summary, f"{name}.json": summary} | parameters
+    return table_files(name, summary, columns, unit) | parameters
 
 
 def summary_table(rows: list[Row], unit: StressUnit, title: str, main: str = "") -> Table:
@@ -246,11 +239,7 @@ def stability_section(rows: list[Row]) -> Section:
 
 def held_out_files(rows: Sequence[Row], headline: str, unit: StressUnit) -> dict[str, list[Row]]:
     """Return the rows, whose headline parameter is in MPa, as files in a unit."""
-    columns = [f"{headline}_{name}" for name in OF_HEADLINE]
-    return {
-        "held_out.csv": with_named_units(rows, columns, unit),
-        "held_out.json": in_unit_of(rows, columns, unit),
-    }
+    return table_files("held_out", rows, [f"{headline}_{name}" for name in OF_HEADLINE], unit)
 
 
 def held_out_table(rows: Sequence[Row], headline: str, unit: StressUnit) -> Table:

@@ -47,7 +47,7 @@ def tissue_result(settings: TissueSettings, results: list[dict[str, Any]]) -> Re
     import pandas as pd
 
     summary = summarise_tissues(results)
-    predictions = pd.DataFrame(map(_plain, results))
+    predictions = pd.DataFrame(results).drop(columns="key").assign(fitted=["; ".join(row["fitted"]) for row in results])
     sets = list(dict.fromkeys(result["tissue"] for result in results))
     nominal, by_class = PROBABILITIES[-1], summary[summary["class"] != ALL]
     tables = tuple(
@@ -121,8 +121,10 @@ def _sections(
         "are made for each set and protocol.",
     ]
     sections = [Section("By class of tissue", (figure,)), Section("How to read it", (tuple(reading),))]
-    if failures := _failures(results):
-        sections.append(Section("Not predicted", (tuple(failures),)))
+    failed = [row for row in results if "failure" in row]
+    if failed:
+        texts = {f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in failed}
+        sections.append(Section("Not predicted", (tuple(sorted(texts)),)))
     origin = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
     return (*sections, Section("Sets", (f"{', '.join(sets)}{origin}.",)))
 
@@ -132,36 +134,26 @@ def readable_tissues(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]
     labels = [name for name in ("protocol", "class") if summary[name].nunique() > 1]
     headers = [*labels, "formulation", "predictions", *SHARES.values(), *RATIOS.values()]
     has_moduli = summary["modulus_inside"].notna().any()
+
+    def ratio(number: float) -> str:
+        return significant(number, 2) if number == number else "-"
+
     rows = [
         [
             *(str(row[name]) for name in (*labels, "formulation", "predictions")),
             *(_percent(row[name]) for name in SHARES),
             *(_percent(row[name]) for name in RATIOS),
-            *([_percent(row["modulus_inside"]), _number(row["modulus_ratio"])] if has_moduli else []),
+            *([_percent(row["modulus_inside"]), ratio(row["modulus_ratio"])] if has_moduli else []),
         ]
         for row in summary.to_dict("records")
     ]
     return [*headers, *(["modulus in", "upper / lower end"] if has_moduli else [])], rows
 
 
-def _number(ratio: float) -> str:
-    return significant(ratio, 2) if ratio == ratio else "-"
-
-
-def _failures(results: list[dict[str, Any]]) -> list[str]:
-    rows = [row for row in results if "failure" in row]
-    return sorted({f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in rows})
-
-
 def _percent(share: float) -> str:
     if share != share:
         return "-"
     return f"{100 * share:.0f} %" if share < MIN_TIMES else f"{share:.3g} times"
-
-
-def _plain(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a result as a row of a table."""
-    return {name: value for name, value in result.items() if name != "key"} | {"fitted": "; ".join(result["fitted"])}
 
 
 def _figure(summary: pd.DataFrame) -> Figure:

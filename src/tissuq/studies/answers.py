@@ -88,7 +88,8 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
             if {**settings, **(settings.get("dimensions") or {})}.get(setting) is not None:
                 answers.append(Answer(((f"--{name}", ""),), setting))
         elif name == "column":
-            roles = [value.partition("=")[0], *_other_roles(message[match.end() :])]
+            others = OTHER_ROLES.match(message[match.end() :].lstrip())
+            roles = [value.partition("=")[0], *re.findall(r"(\w+)=", others[1] if others else "")]
             names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
             pairs = [f"{role}={column}" for role in roles for column in names] if names else [value]
             answers += [Answer((("column", pair),)) for pair in pairs]
@@ -151,11 +152,6 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
         earlier = merged.get(setting)
         merged[setting] = {**earlier, **value} if isinstance(value, dict) and isinstance(earlier, dict) else value
     return merged
-
-
-def _other_roles(text: str) -> list[str]:
-    match = OTHER_ROLES.match(text.lstrip())
-    return re.findall(r"(\w+)=", match[1]) if match else []
 
 
 def _values(name: str) -> list[str]:

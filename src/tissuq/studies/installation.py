@@ -62,11 +62,6 @@ class Extra:
     purpose: str
     packages: tuple[Package, ...]
 
-    @property
-    def is_installed(self) -> bool:
-        """Whether all its packages are here in a version that is enough."""
-        return all(package.is_enough for package in self.packages)
-
 
 @dataclass(frozen=True)
 class Program:

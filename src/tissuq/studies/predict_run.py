@@ -274,12 +274,8 @@ def run_prediction(
     step("reading")
     mode = settings.mode_in(folder, law)
     options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}
-    options |= {"mode": mode, "stretch": settings.points_of(mode), "data": _data(settings, mode, folder)}
+    options |= {"mode": mode, "stretch": settings.points_of(mode)}
+    if settings.data is not None:
+        options["data"] = settings.data.model_copy(update={"mode": mode}).experiment(folder)
     step("predicting")
     return predict_run(folder / settings.run, settings.discrepancy, settings.law_of(law), **options)
-
-
-def _data(settings: PredictionSettings, mode: str, folder: Path) -> Experiment | None:
-    if settings.data is None:
-        return None
-    return settings.data.model_copy(update={"mode": mode}).experiment(folder)

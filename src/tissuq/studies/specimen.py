@@ -187,7 +187,8 @@ def run_specimen(
             skipped[f"{name}, each test predicted from the others"] = str(error)
             continue
         held_out += [
-            {"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in predictions
+            {"formulation": name} | {str(key): None if value != value else value for key, value in row.items()}
+            for row in predictions
         ]
     results = settings, experiment, posteriors, seconds, skipped, assessments, read_warnings
     return SpecimenStudy(*results, tuple(held_out))
@@ -212,11 +213,6 @@ def fitted(
     applicable_settings = settings.model_copy(update={"priors": applicable, "discrepancies": (discrepancy,)})
     priors = priors_in_mpa(applicable_settings, [material], experiment)
     return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
-
-
-def _known(value: Any) -> Any:
-    """Return a value, None for one that is no number."""
-    return None if value != value else value
 
 
 def _options(
