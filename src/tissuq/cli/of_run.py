@@ -13,6 +13,7 @@ from tissuq.cli.running import IntoFolder, LawOfRun, OfRun
 from tissuq.errors import InputError
 from tissuq.studies.design_settings import DesignSettings
 from tissuq.studies.files_of_tests import resolve
+from tissuq.studies.model_settings import CardOptions
 from tissuq.studies.option import option
 from tissuq.studies.prediction_settings import PredictionSettings
 from tissuq.studies.shared_options import RunSettings, sampling
@@ -52,8 +53,7 @@ def design(call: Call[DesignSettings, OfRun]) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
     from tissuq.report.design import design_result
     from tissuq.report.source_run import said_by
-    from tissuq.studies.design import run_design
-    from tissuq.studies.ensemble_target import with_folder
+    from tissuq.studies.design import run_design, with_folder
 
     stated = call.stated.get("run")
     if not (call.config or stated):
@@ -77,22 +77,13 @@ def design(call: Call[DesignSettings, OfRun]) -> None:
     )
 
 
-class ExportSettings(RunSettings):
+class ExportSettings(CardOptions, RunSettings):
     """Everything that material cards depend on."""
 
     format: str = option("abaqus", "abaqus, calculix, ansys, febio, ls-dyna, or table (W1 and W2 as CSV).")
     draws: int = option(20, "Number of draws, a card each.")
     sampling: str = sampling()
     all_draws: bool = option(False, "Keep draws that are not stable over the measured range.")
-    law: str | None = option(
-        None,
-        "Write the nearest polynomial, reduced-polynomial, ogden or (FEBio) mixture [the draws' own law where the code "
-        "has it, else the best of these].",
-    )
-    order: int | None = option(None, "Order or number of terms of that law.")
-    unit: str = option("MPa", "Unit of stress of the model: MPa, kPa or Pa.")
-    bulk_modulus: float | None = option(None, "In that unit, of all draws [1000 times the mean initial shear modulus].")
-    poisson: float | None = option(None, "Instead: Poisson's ratio of all draws.")
     name: str = option("TISSUE", "Name of the material in the cards.")
     number: int = option(1, "Number of the material in the model (FEBio, LS-DYNA, ANSYS).")
     seed: int = option(0, "Seed of the draws.")
@@ -105,7 +96,7 @@ class ExportOptions(LawOfRun, IntoFolder):
 @command(ExportSettings, ExportOptions, out="Folder for the cards [cards/RUN-FORMAT].")
 def export(call: Call[ExportSettings, ExportOptions]) -> None:
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
-    from tissuq.export import CardSettings, card_format
+    from tissuq.export import card_format
     from tissuq.report.cards import INDEX, write_cards
     from tissuq.report.run_folder import check_apart, check_target
     from tissuq.report.terminal import print_explanations
@@ -117,13 +108,12 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     check_apart(target, run)
     card_format(settings.format)
     check_target(target, call.command, force=force)
-    of_cards = settings.model_dump(include={"law", "order", "unit", "bulk_modulus", "poisson", "name", "number"})
-    CardSettings(**of_cards)
+    of_cards = vars(settings.card_settings(name=settings.name, number=settings.number))
     posterior = load(run, settings.discrepancy, settings.law_of(call.law))
     spread = cast("Sampling", settings.sampling)
     ensemble = posterior.ensemble(settings.draws, settings.seed, spread, admissible=not settings.all_draws)
     source = f"run {run.resolve().name} of tissuq, {spread} draws from seed {settings.seed}"
-    cards = write_cards(ensemble, target, settings.format, force=force, source=source, **of_cards)
+    cards = write_cards(ensemble, target, settings.format, force=force, **of_cards | {"source": source})
     print_explanations(cards.warnings)
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]
     print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
