@@ -17,7 +17,7 @@ from tissuq.report.prediction_tables import band_table, score_table
 from tissuq.report.result import Result
 from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted
-from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
+from tissuq.studies.run_settings import ComparedFile, PredictionSettings
 
 
 @pytest.fixture(scope="module")

@@ -139,7 +139,7 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
     from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
     from tissuq.studies.predict_run import run_prediction
-    from tissuq.studies.prediction_settings import PredictionSettings
+    from tissuq.studies.run_settings import PredictionSettings
 
     options = _options(request, ("mode", "stretch", "stretch2"))
     run = RUNS / _run_name(request)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
 import typer
 
 from tissuq.cli.progress import Monitor
-from tissuq.cli.running import Configured, LawOfRun, Running, Written
+from tissuq.cli.running import Configured, IntoFolder, LawOfRun, Running, Written
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings
 from tissuq.studies.settings import load_settings
@@ -148,7 +148,7 @@ class Call(Generic[Kind, How]):
         """Return the folder that is to be written, once it may be; ``default`` unless another is named."""
         from tissuq.report.run_folder import check_apart, check_target
 
-        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        assert isinstance(self.how, IntoFolder)  # noqa: S101 (only such commands have a folder)
         folder = self.how.out or default
         if apart_from is not None:
             check_apart(folder, apart_from)

@@ -35,7 +35,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     from tissuq.assessment import compare as compare_fits
     from tissuq.experiments.units import stress_unit
     from tissuq.report.comparison import comparison_result
-    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.run_folder import run_folder
     from tissuq.report.terminal import print_result
     from tissuq.report.writer import write_result
 
@@ -43,7 +43,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     if out is not None:
         if any(path.resolve().is_relative_to(out.resolve()) for path in runs):
             raise InputError(f"'{out}' holds one of the compared runs; choose another folder with --out.")
-        check_target(out, call.command, force=force)
+        call.target(out)
     with call.monitor.steps() as step:
         step("reading")
         trees = _trees(runs)

@@ -53,12 +53,12 @@ class InspectOptions(IntoFolder):
 def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     """Show what is understood of files of measurements: tests, columns, dimensions, cycles, rows, noise, warnings."""
     from tissuq.experiments.reading.inspection import Inspection, overview
-    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.run_folder import run_folder
     from tissuq.studies.files_of_tests import study_file
 
     write, ask, out, force = call.how.write, call.how.ask, call.how.out, call.how.force
     if out is not None:
-        check_target(out, call.command, force=force)
+        call.target(out)
     if ask and write is None:
         write = Path("study.toml")
     if write is not None and write.exists() and not force:

@@ -11,12 +11,10 @@ from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
 from tissuq.cli.running import IntoFolder, LawOfRun, OfRun
 from tissuq.errors import InputError
-from tissuq.studies.design_settings import DesignSettings
 from tissuq.studies.files_of_tests import resolve
 from tissuq.studies.model_settings import CardOptions
-from tissuq.studies.option import option
-from tissuq.studies.prediction_settings import PredictionSettings
-from tissuq.studies.shared_options import RunSettings, sampling
+from tissuq.studies.option import option, sampling
+from tissuq.studies.run_settings import DesignSettings, PredictionSettings, RunSettings
 
 if TYPE_CHECKING:
     from tissuq.posterior.drawn_materials import Sampling
@@ -98,22 +96,19 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
     from tissuq.export import card_format
     from tissuq.report.cards import INDEX, write_cards
-    from tissuq.report.run_folder import check_apart, check_target
     from tissuq.report.terminal import print_explanations
     from tissuq.studies.earlier_run import load
 
-    settings, force = call.settings, call.how.force
+    settings = call.settings
     run = Path(settings.run)
-    target = call.how.out or Path("cards") / f"{run.resolve().name}-{settings.format}"
-    check_apart(target, run)
     card_format(settings.format)
-    check_target(target, call.command, force=force)
+    target = call.target(Path("cards") / f"{run.resolve().name}-{settings.format}", apart_from=run)
     of_cards = vars(settings.card_settings(name=settings.name, number=settings.number))
     posterior = load(run, settings.discrepancy, settings.law_of(call.law))
     spread = cast("Sampling", settings.sampling)
     ensemble = posterior.ensemble(settings.draws, settings.seed, spread, admissible=not settings.all_draws)
     source = f"run {run.resolve().name} of tissuq, {spread} draws from seed {settings.seed}"
-    cards = write_cards(ensemble, target, settings.format, force=force, **of_cards | {"source": source})
+    cards = write_cards(ensemble, target, settings.format, force=call.how.force, **of_cards | {"source": source})
     print_explanations(cards.warnings)
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]
     print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")

@@ -15,7 +15,7 @@ from tissuq.decks.model_ensemble import ModelEnsemble
 from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
 from tissuq.report.band_table import Bands
-from tissuq.report.simulation_figures import draw_shares
+from tissuq.report.simulation_figures import draw_shares, moments
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,14 +102,5 @@ def write_fields(path: Path, fields: Sequence[FinalFields]) -> None:
         cells["I1 - 3"], cells["I2 - 3"] = (np.stack([draw.invariants[:, axis] for draw in fields]) for axis in (0, 1))
     ends = np.cumsum([len(members) for members in first_draw.cells.values()])[:-1]
     blocks = [(CELL_TYPES[kind][0], members) for kind, members in first_draw.cells.items()]
-    of_cells = {name: np.split(values, ends) for name, values in _moments(cells).items()}
-    meshio.Mesh(first_draw.points, blocks, _moments(points), of_cells).write(path, file_format="vtu")
-
-
-def _moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return mean and standard deviation over the first axis, by labels."""
-    moments = {}
-    for name, values in fields.items():
-        moments[f"mean {name}"] = values.mean(axis=0)
-        moments[f"sd of {name}"] = values.std(axis=0, ddof=1)
-    return moments
+    of_cells = {name: np.split(values, ends) for name, values in moments(cells).items()}
+    meshio.Mesh(first_draw.points, blocks, moments(points), of_cells).write(path, file_format="vtu")

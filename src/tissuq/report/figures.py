@@ -14,7 +14,6 @@ from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BASE, TRUTH, new_figure, save_figure
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
-from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described, described
 from tissuq.pictures.parameters import ridges
 from tissuq.pictures.stability import shade_instability
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "answer_figure",
     "described_curves",
     "marginal_figure",
     "predictive_figure",
@@ -41,17 +39,6 @@ def described_curves(posterior: Posterior) -> list[Described]:
     """Return what a posterior says of its curves; what is inside the bands it knows already."""
     inside = posterior.inside_bands() if posterior.solution.is_of_data else None
     return described(posterior.solution, inside=inside)
-
-
-def answer_figure(
-    posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False, computed: Sequence[Described] | None = None
-) -> Figure:
-    """Return `Posterior.plot` for the head of a page: 1000 x 480 px, or 400 px wide with larger letters.
-
-    Further rows of panels make it taller. Its SVG has these sizes at 96 px an inch; a page embeds both, and shows the
-    narrow one on screens of up to 600 px. What ``computed`` says of the curves is not computed anew.
-    """
-    return answer_on_new_figure(computed or described_curves(posterior), unit, is_narrow=is_narrow)
 
 
 def predictive_figure(

@@ -36,7 +36,7 @@ from tissuq.studies.prediction import Prediction, draw_prediction
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tissuq.studies.prediction_settings import PredictionSettings
+    from tissuq.studies.run_settings import PredictionSettings
 
 __all__ = ["prediction_figure", "prediction_result"]
 

@@ -20,6 +20,7 @@ from tissuq.report.simulation_figures import (
     field_figure,
     force_and_strain_figure,
     force_figure,
+    moments,
     share_figure,
     write_collection,
     write_vtu,
@@ -198,15 +199,8 @@ def _write_fields(study: SimulationStudy, folder: Path) -> None:
     simulation = study.simulation
     mesh = simulation.case.mesh()
     if len(simulation.fields.get("first_invariant", ())) > 1:
-        displacement = simulation.fields["displacement"]
-        points = {
-            "mean displacement": displacement.mean(axis=0),
-            "sd of displacement": displacement.std(axis=0, ddof=1),
-        }
-        cells = {}
-        for name, label in CELL_FIELDS.items():
-            cells[f"mean {label}"] = simulation.fields[name].mean(axis=0)
-            cells[f"sd of {label}"] = simulation.fields[name].std(axis=0, ddof=1)
+        points = moments({"displacement": simulation.fields["displacement"]})
+        cells = moments({label: simulation.fields[name] for name, label in CELL_FIELDS.items()})
         write_vtu(folder / "fields.vtu", mesh, points, cells)
     (folder / "steps").mkdir(exist_ok=True)
     files: list[tuple[float, str]] = []

@@ -28,6 +28,7 @@ __all__ = [
     "field_figure",
     "force_and_strain_figure",
     "force_figure",
+    "moments",
     "share_figure",
     "write_collection",
     "write_vtu",
@@ -205,3 +206,12 @@ def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:
         SubElement(collection, "DataSet", timestep=f"{time:.12g}", part="0", file=name)
     indent(file)
     ElementTree(file).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return mean and standard deviation over the first axis, by labels."""
+    moments = {}
+    for name, values in fields.items():
+        moments[f"mean {name}"] = values.mean(axis=0)
+        moments[f"sd of {name}"] = values.std(axis=0, ddof=1)
+    return moments

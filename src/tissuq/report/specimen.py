@@ -12,9 +12,10 @@ from tissuq.assessment import Assessment
 from tissuq.assessment.answer import NOTABLE_SHARE
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.experiments.units import stress_unit
+from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described
 from tissuq.report.chart import chart_data
-from tissuq.report.figures import answer_figure, described_curves, marginal_figure, predictive_figure
+from tissuq.report.figures import described_curves, marginal_figure, predictive_figure
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, methods_section, named, subject_of
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
@@ -97,7 +98,7 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
         command=f"fit{inputs.options}",
         picture=Picture(
             "answer",
-            lambda: answer_figure(posteriors[study.main], unit, is_narrow=True, computed=computed()[study.main]),
+            lambda: answer_on_new_figure(computed()[study.main], unit, is_narrow=True),
             "Measurements, and the 95 % predictive band of material, discrepancy and noise",
             "Measurements, and the 95 % band of new ones.",
             chart=lambda: chart_data(posteriors, study.main, unit, computed()),

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 from pydantic import field_validator, model_validator
 
 from tissuq.studies.model_settings import ModelSettings
-from tissuq.studies.option import argument, option
+from tissuq.studies.option import argument, option, seed
 from tissuq.studies.option_texts import column, number_or_text, pairs_of, priors, sd_or_unknown
 from tissuq.studies.settings import positive_or_unknown
-from tissuq.studies.shared_options import seed
 
 if TYPE_CHECKING:
     from tissuq.emulation.deck_forward import DeckForward

@@ -8,10 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator
 
 from tissuq.parameters.checks import MAX_SEED
-from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option import Settings, argument, option, seed
 from tissuq.studies.option_texts import priors, tolerances
 from tissuq.studies.settings import SizesOfErrors
-from tissuq.studies.shared_options import seed
 
 __all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions"]
 

@@ -19,10 +19,10 @@ from tissuq.next_test.next_test import NextTest
 from tissuq.next_test.quantities import QuantityTarget, quantity_target
 from tissuq.next_test.ranking import rank_tests
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.design_settings import DesignSettings
 from tissuq.studies.earlier_run import load
 from tissuq.studies.ensemble import drawn_materials
 from tissuq.studies.model_settings import EnsembleSettings
+from tissuq.studies.run_settings import DesignSettings
 from tissuq.studies.settings import RECIPE, damage_reported, load_settings
 
 if TYPE_CHECKING:

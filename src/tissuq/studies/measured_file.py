@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self, cast
 
 from pydantic import Field, field_validator, model_validator
 
-from tissuq.studies.option import Settings, option
+from tissuq.studies.option import Settings, option, seed
 from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown, tolerances
 from tissuq.studies.settings import SizesOfErrors, looked_up, positive_or_unknown
-from tissuq.studies.shared_options import seed
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -174,11 +173,11 @@ class FittedSettings(Settings):
         parse=sd_or_unknown,
     )
     noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
-        None, "Instead: unknown, proportional, repeats or another one, as for tissuq fit."
+        None,
+        "Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
+        "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again).",
     )
-    method: str = option(
-        "auto", "Of every specimen's fit: auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method"
-    )
+    method: str = option("auto", "auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method")
     seed: int = seed()
     estimand: str | None = option(
         None,

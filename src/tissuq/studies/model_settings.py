@@ -6,9 +6,8 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option import Settings, argument, mesh_order, option, sampling, seed
 from tissuq.studies.option_texts import pairs_of
-from tissuq.studies.shared_options import mesh_order, sampling, seed
 
 if TYPE_CHECKING:
     from tissuq.export import CardSettings

@@ -12,7 +12,12 @@ from typing import Any, Self, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
-__all__ = ["Option", "Settings", "Slot", "argument", "option", "options_of", "slots_of", "stated"]
+from tissuq.parameters.checks import MAX_SEED
+
+__all__ = [
+    "Option", "Settings", "Slot", "argument", "mesh_order", "option", "options_of", "sampling", "seed", "slots_of",
+    "stated",
+]  # fmt: skip
 
 
 class Settings(BaseModel):
@@ -141,6 +146,29 @@ def option(
 def argument(default: Any, help: str, **more: Any) -> Any:
     """Declare a setting that is typed without its name; the arguments are those of `option`."""
     return option(default, help, is_argument=True, **more)
+
+
+def seed() -> Any:
+    """Declare the seed of random numbers."""
+    return option(0, "Seed of the random numbers.", ge=0, le=MAX_SEED)
+
+
+def sampling() -> Any:
+    """Declare how draws spread through a posterior."""
+    return option(
+        "sobol", "How draws spread: sobol, latin or random.", choices="tissuq.posterior.drawn_materials:Sampling"
+    )
+
+
+def mesh_order(group: str) -> Any:
+    """Declare the order with which what is computed on a finer mesh converges."""
+    return option(
+        None,
+        "Power of the size of elements with which the error of the mesh falls: 1 at sharp edges, 2 without [1].",
+        gt=0,
+        le=8,
+        group=group,
+    )
 
 
 def options_of(kind: type[BaseModel]) -> Iterator[tuple[str, Option, FieldInfo]]:

@@ -84,7 +84,6 @@ class PopulationSettings(FittedSettings, ReadingSettings):
     without: tuple[str, ...] = option(
         (), "Specimen to leave out, by its name in the table of specimens; repeat for more."
     )
-    mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
 
     def sources(self, folder: Path = Path()) -> dict[str, list[Path]]:
         """Return the files of every specimen; one file alone where a column in it names them."""

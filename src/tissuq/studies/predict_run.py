@@ -22,7 +22,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
 from tissuq.studies.prediction import Prediction, calibrated_points, range_of
-from tissuq.studies.prediction_settings import POINTS, PredictionSettings
+from tissuq.studies.run_settings import POINTS, PredictionSettings
 
 if TYPE_CHECKING:
     import pandas as pd

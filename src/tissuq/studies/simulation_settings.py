@@ -12,10 +12,10 @@ from pydantic import field_validator, model_validator
 
 from tissuq.errors import InputError
 from tissuq.registry import find
-from tissuq.studies.option import option
+from tissuq.studies.option import mesh_order, option, seed
 from tissuq.studies.option_texts import number_or_text, pairs_of
+from tissuq.studies.run_settings import RunSettings
 from tissuq.studies.settings import looked_up
-from tissuq.studies.shared_options import RunSettings, mesh_order, seed
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
