@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext, redirect_stdout
 from dataclasses import replace
-from importlib import import_module
 from inspect import Parameter, Signature
 from io import StringIO
 from types import MappingProxyType
@@ -18,7 +17,7 @@ from tissuq.cli.call import Call
 from tissuq.cli.progress import Monitor, stopping
 from tissuq.cli.running import Running, Verbosity
 from tissuq.studies.option import Settings, Slot, slots_of, stated
-from tissuq.studies.settings import load_settings
+from tissuq.studies.settings import imported, load_settings
 
 __all__ = ["CONFIGURED", "FORMER_NAMES", "Command", "command", "settings_of", "todays_names"]
 
@@ -130,8 +129,7 @@ def settings_of(name: str) -> type[Settings] | None:
     kind, location = CONFIGURED.get(name, (None, ""))
     if not location:
         return kind
-    module, _, of_file = location.partition(":")
-    of_whole_file: type[Settings] = getattr(import_module(module), of_file)
+    of_whole_file: type[Settings] = imported(location)
     return of_whole_file
 
 

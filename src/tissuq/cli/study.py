@@ -91,8 +91,7 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
     from tissuq.report.tissues import tissue_result
     from tissuq.validation.tissues import TissueSettings, run_benchmark
 
-    settings = call.loaded_as(TissueSettings)
-    _carry_out(call, settings, _folder(call, "tissues"), run_benchmark, tissue_result)
+    _carry_out(call, call.loaded_as(TissueSettings), _folder(call, "tissues"), run_benchmark, tissue_result)
 
 
 @study.command("structures", cls=Command)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
-from tissuq.emulation import Calibration, DeckForward, SeveralModels
+from tissuq.emulation import DeckForward, SeveralModels
 from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.mechanics.user_law import LAW
@@ -23,8 +23,10 @@ from tissuq.report.tables import Row, interval, known_number, significant
 from tissuq.report.writer import posterior_files
 from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy
 
-__all__ = ["HEADERS", "calibration_result", "readable_calibration"]
+__all__ = ["calibration_result"]
 
+WORST_RUNS = 8
+"""Rows of the page's table of runs that were left out."""
 LARGE_SHARE = 0.1
 """Share of the variance of a parameter that is due to the emulator, beyond which more runs are worth while."""
 BY_EMULATOR = (
@@ -43,8 +45,6 @@ SOBOL = (
     "Share of the variance of the outputs, where all parameters vary over their priors, that a parameter explains "
     "alone (first) and with its interactions (total): Sobol's indices from the emulator."
 )
-HEADERS = ["parameter", "mean", "sd", "95 % interval", "ESS", "by emulator"]
-"""Of `readable_calibration`."""
 
 
 def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result:
@@ -83,10 +83,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
             "answer", lambda: band_figure(calibration, study.data, is_narrow=True),
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
         ),
-        tables=(
-            Table(HEADERS, readable_calibration(study), f"{model}: {runs} runs",
-                  note=f"{BY_EMULATOR} Emulator, {calibration.check}."),
-        ),
+        tables=(_parameters(study),),
         sections=_sections(study),
         warnings=tuple(study.warnings),
         files=files,
@@ -200,34 +197,23 @@ def _tables(study: CalibrationStudy) -> dict[str, Any]:
     }
 
 
-WORST_RUNS = 8
-"""Rows of the page's table of runs that were left out."""
-
-
-def _worst_runs(calibration: Calibration) -> list[list[str]]:
-    """Return the worst rows of `Calibration.leave_one_out` as text."""
-    return [
-        [*(f"{value:.4g}" for value in row[:-3]), f"{row[-3]:.2g}", f"{row[-2]:.2g}", f"{row[-1]:.1f}"]
-        for row in calibration.leave_one_out.to_numpy()[:WORST_RUNS]
-    ]
-
-
 def _rows(columns: dict[str, Any]) -> list[Row]:
     """Return columns as rows; nothing for nan."""
     lists = [[None if np.isnan(value) else float(value) for value in column] for column in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
-def readable_calibration(study: CalibrationStudy) -> list[list[str]]:
-    """Return the rows of the summary as text, under `HEADERS`, in the units of the forward model."""
+def _parameters(study: CalibrationStudy) -> Table:
+    """Return the parameters in the units of the forward model."""
     calibration, rows = study.calibration, []
     for symbol, marginal in calibration.marginals.items():
-        low, high = marginal.hdi()
         mean, sd = (interval(number, number, marginal.sd)[0] for number in (marginal.mean, marginal.sd))
-        ends = "[{}, {}]".format(*interval(low, high, marginal.sd))
+        ends = "[{}, {}]".format(*interval(*marginal.hdi(), marginal.sd))
         share = calibration.emulator_share[symbol]
         rows.append([study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
-    return rows
+    headers = ["parameter", "mean", "sd", "95 % interval", "ESS", "by emulator"]
+    note = f"{BY_EMULATOR} Emulator, {calibration.check}."
+    return Table(headers, rows, f"{study.forward.name}: {len(calibration.runs)} runs", note=note)
 
 
 def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
@@ -268,6 +254,10 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
         f"The emulator's error is at most {calibration.error_ratio:.2g} of noise and discrepancy (variances, in the "
         "worst direction of the data, mean over the posterior).",
     )
+    worst = [
+        [*(f"{value:.4g}" for value in point), f"{error:.2g}", f"{sd:.2g}", f"{standardised:.1f}"]
+        for *point, error, sd, standardised in calibration.leave_one_out.to_numpy()[:WORST_RUNS]
+    ]
     sensitivity = [
         [str(symbol), f"{100 * first_order:.0f} %", f"{100 * total:.0f} %"]
         for symbol, first_order, total in calibration.sensitivity.itertuples()
@@ -275,7 +265,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     sections = [
         Section("Posteriors and predictive checks", (band, coverage, marginals)),
         Section("The emulator", (EMULATOR, checks, errors, WORST,
-                Table([*labels, "error", "sd", "standardised"], _worst_runs(calibration)))),
+                Table([*labels, "error", "sd", "standardised"], worst))),
         Section("What the outputs depend on", (SOBOL, Table(["parameter", "first", "total"], sensitivity))),
     ]  # fmt: skip
     if runs.failure_summary:

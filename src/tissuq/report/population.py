@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from tissuq.model.tolerances import Tolerances
     from tissuq.population import Population
 
-__all__ = ["HEADERS", "population_result", "readable_population"]
+__all__ = ["population_result"]
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""
@@ -73,8 +73,6 @@ HOW_TO_READ = (
 )
 POINTS = 81
 """Of the stress of a new specimen."""
-HEADERS = ["parameter", "unit", "quantity", "median", "95 % interval"]
-"""Of `readable_population`."""
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
 QUANTITIES = {
@@ -123,7 +121,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
         ),
         tables=(
-            Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), _note(population)),
+            _parameters(study),
             *effects_of_covariates(study),
             *needed_table_of(study, needed),
         ),
@@ -319,21 +317,21 @@ def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
     return scaled
 
 
-def readable_population(study: PopulationStudy) -> list[list[str]]:
-    """Return the rows of the summary as text, under `HEADERS`, in the unit of the files."""
+def _parameters(study: PopulationStudy) -> Table:
+    """Return the parameters of the population in the unit of the files."""
     population, rows = study.population, []
     table = numbers_of(population.summary(unit="MPa"))
     for symbol, is_log in zip(population.symbols, population.coordinates.is_log, strict=True):
         factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
-            is_ratio = quantity == "spread" and is_log
             numbers = table[symbol, quantity]
-            if is_ratio:
-                cells = _text({name: exp(number) for name, number in numbers.items()})
+            if quantity == "spread" and is_log:
+                cells = ["factor", words, *_text({name: exp(number) for name, number in numbers.items()})]
             else:
-                cells = _text(numbers, factor)
-            rows.append([symbol, "factor" if is_ratio else unit, words, *cells])
-    return rows
+                cells = [unit, words, *_text(numbers, factor)]
+            rows.append([symbol, *cells])
+    headers = ["parameter", "unit", "quantity", "median", "95 % interval"]
+    return Table(headers, rows, f"A population of {len(study.tests)} specimens", (1, 2), _note(population))
 
 
 def _readable_specimens(study: PopulationStudy) -> list[list[str]]:

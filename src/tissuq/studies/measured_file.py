@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from tissuq.studies.option import Settings, option, seed
 from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown, tolerances
-from tissuq.studies.settings import SizesOfErrors, looked_up, positive_or_unknown
+from tissuq.studies.settings import SizesOfErrors, positive_or_unknown, there_is
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -201,14 +201,7 @@ class FittedSettings(Settings):
             value, "the file's stress unit", "; noise of zero would make every measurement exact"
         )
 
-    @field_validator("estimand")
-    @classmethod
-    def _estimand_there_is(cls, name: str | None) -> str | None:
-        from tissuq.model.tolerances import Tolerances
-
-        if name is not None:
-            looked_up(Tolerances, name)
-        return name
+    _known_estimand = field_validator("estimand")(there_is("tissuq.model.tolerances:Tolerances"))
 
     @model_validator(mode="after")
     def _one_noise(self) -> Self:

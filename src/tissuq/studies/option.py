@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from importlib import import_module
 from pathlib import Path
 from types import NoneType
 from typing import Any, Self, get_args, get_origin
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from pydantic.fields import FieldInfo
 
 from tissuq.parameters.checks import MAX_SEED
+from tissuq.studies.settings import imported
 
 __all__ = [
     "Option", "Settings", "Slot", "argument", "mesh_order", "option", "options_of", "sampling", "seed", "slots_of",
@@ -38,8 +38,7 @@ class Settings(BaseModel):
     def _one_of_choices(cls, value: Any, info: ValidationInfo) -> Any:
         declared = cls.model_fields[str(info.field_name)].json_schema_extra
         if value is not None and isinstance(declared, Option) and declared.choices:
-            module, _, name = declared.choices.partition(":")
-            choices = get_args(getattr(import_module(module), name))
+            choices = get_args(imported(declared.choices))
             if value not in choices:
                 listed = ", ".join(map(repr, choices[:-1]))
                 raise ValueError(f"must be {listed} or {choices[-1]!r}, not {value!r}")

@@ -15,7 +15,7 @@ from tissuq.registry import find
 from tissuq.studies.option import mesh_order, option, seed
 from tissuq.studies.option_texts import number_or_text, pairs_of
 from tissuq.studies.run_settings import RunSettings
-from tissuq.studies.settings import looked_up
+from tissuq.studies.settings import there_is
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
@@ -120,13 +120,7 @@ class SimulationSettings(RunSettings):
             return {**values, "case": values.get("case") or USUAL_CASE}
         return {**values, "case": None if values.get("case") == USUAL_CASE else values.get("case")}
 
-    @field_validator("bulk_ratio")
-    @classmethod
-    def _nearly_incompressible(cls, ratio: float) -> float:
-        from tissuq.finite_elements.solver import check_bulk_ratio
-
-        looked_up(check_bulk_ratio, ratio)
-        return ratio
+    _nearly_incompressible = field_validator("bulk_ratio")(there_is("tissuq.finite_elements.solver:check_bulk_ratio"))
 
     def sized_case(self, beside: Path = Path()) -> Case:
         """Return the case with its sizes, or the body of a mesh that lies beside a recipe.
