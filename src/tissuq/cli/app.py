@@ -12,7 +12,6 @@ from typer.core import TyperGroup
 from tissuq.cli import (
     calibrate,
     catalogue,
-    compare,
     ensemble,
     fit,
     inspect,
@@ -77,7 +76,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show, "app": project.app,
     },
     "After a fit": {
-        "predict": of_run.predict, "compare": compare.compare, "design": of_run.design, "export": of_run.export,
+        "predict": of_run.predict, "compare": show.compare, "design": of_run.design, "export": of_run.export,
         "structure": structure.structure, "ensemble": ensemble.ensemble,
     },
     "Several specimens, expensive models": {"population": population.population, "calibrate": calibrate.calibrate},

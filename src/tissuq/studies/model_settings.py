@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CardOptions", "EnsembleSettings", "ModelSettings"]
 
-GROUP = "Solver and cards"
+SOLVER, CARDS = "Solver", "Cards"
 MESH = "Error of the mesh"
 
 
@@ -25,14 +25,14 @@ class CardOptions(Settings):
         None,
         "Write the nearest polynomial, reduced-polynomial, ogden or (FEBio) mixture [the draws' own law where the code "
         "has it, else the best of these].",
-        group=GROUP,
+        group=CARDS,
     )
-    order: int | None = option(None, "Order or number of terms of that law.", group=GROUP)
-    unit: str = option("MPa", "Unit of stress of the model: MPa, kPa or Pa.", group=GROUP)
+    order: int | None = option(None, "Order or number of terms of that law.", group=CARDS)
+    unit: str = option("MPa", "Unit of stress of the model: MPa, kPa or Pa.", group=CARDS)
     bulk_modulus: float | None = option(
-        None, "In that unit, of all draws [1000 times the mean initial shear modulus].", gt=0, lt=inf, group=GROUP
+        None, "In that unit, of all draws [1000 times the mean initial shear modulus].", gt=0, lt=inf, group=CARDS
     )
-    poisson: float | None = option(None, "Instead: Poisson's ratio of all draws.", group=GROUP)
+    poisson: float | None = option(None, "Instead: Poisson's ratio of all draws.", group=CARDS)
 
     def card_settings(self, **changes: Any) -> CardSettings:
         """Return the settings of the cards.
@@ -50,17 +50,17 @@ class CardOptions(Settings):
 class ModelSettings(CardOptions):
     """The solver of a deck, and the cards in it."""
 
-    solver: str | None = option(None, "ccx, febio4 or command [that of the deck].", group=GROUP)
+    solver: str | None = option(None, "ccx, febio4 or command [that of the deck].", group=SOLVER)
     command: str = option(
-        "", "Command of the solver, such as 'abaqus job={job} ask=off', {deck} with suffix.", group=GROUP
+        "", "Command of the solver, such as 'abaqus job={job} ask=off', {deck} with suffix.", group=SOLVER
     )
-    deck: str | None = option(None, "abaqus, febio, ls-dyna or ansys [what the file is].", group=GROUP)
-    card_format: str | None = option(None, "Format of cards [that of the solver].", name="format", group=GROUP)
+    deck: str | None = option(None, "abaqus, febio, ls-dyna or ansys [what the file is].", group=SOLVER)
+    card_format: str | None = option(None, "Format of cards [that of the solver].", name="format", group=CARDS)
     also: list[str] = option(
         default_factory=list,
         help="Another file that the solver needs beside the deck; repeat for more.",
         takes=list[Path],
-        group=GROUP,
+        group=SOLVER,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import fields
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from tissuq.registry import find
 from tissuq.studies.option import mesh_order, option, seed
 from tissuq.studies.option_texts import number_or_text, pairs_of
 from tissuq.studies.run_settings import RunSettings
-from tissuq.studies.settings import there_is
+from tissuq.studies.settings import imported, there_is
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
@@ -30,12 +31,6 @@ MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
 OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts", "finer_mesh", "mesh_order")
 """Options, besides the sets that are held, that say nothing without a mesh."""
 LOADS = {"move": MOVEMENT, "press": MOVEMENT, "inflate": re.compile(f"(?P<set>.+)={NUMBER}", re.IGNORECASE)}
-
-
-def _bulk_ratio() -> float:
-    from tissuq.finite_elements.response import BULK_RATIO
-
-    return BULK_RATIO
 
 
 class SimulationSettings(RunSettings):
@@ -71,7 +66,10 @@ class SimulationSettings(RunSettings):
         lt=inf,
     )
     bulk_ratio: float = option(
-        help="Bulk modulus in initial shear moduli [2000].", default_factory=_bulk_ratio, gt=0, lt=inf
+        help="Bulk modulus in initial shear moduli [2000].",
+        default_factory=partial(imported, "tissuq.finite_elements.response:BULK_RATIO"),
+        gt=0,
+        lt=inf,
     )
 
     mesh: str | None = option(
