@@ -239,3 +239,11 @@ def test_a_problem_stands_above_the_answer(capsys):
 def test_a_number_that_is_not_to_be_reported_does_not_stand_out(verdict, classes, tmp_path):
     write_result(result_of(uses=(Use("report it", verdict, "known to ± 90 %"),)), tmp_path, figures=False)
     assert f'<p class="{classes}">' in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_table_of_columns_has_a_cell_of_every_row_in_each():
+    rows = [{"mean": 1.5, "name": "a"}, {"mean": 2.0, "name": "b"}]
+    table = Table.of(
+        rows, {"fit": lambda row: row["name"], "mean": lambda row: f"{row['mean']:.1f}"}, "Fits", note="kPa"
+    )
+    assert table == Table(["fit", "mean"], [["a", "1.5"], ["b", "2.0"]], "Fits", note="kPa")
