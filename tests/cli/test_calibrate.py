@@ -124,7 +124,7 @@ def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate
     again = ["--config", "run/run.toml", "--no-figures", "--out", "again"]
     refused = command("calibrate", *again, folder=folder)
     assert refused.status == 2
-    assert "whose code runs only if you name it: add --forward input/force.py:force" in refused.err
+    assert "used only if named here, too; if you know them, add --forward input/force.py:force" in refused.err
     said = command("calibrate", "--forward", "run/input/force.py:force", *again, folder=folder)
     assert said.status == 0, said.err
     assert (folder / "again" / "summary.csv").read_bytes() == (folder / "run" / "summary.csv").read_bytes()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.report.answer_of_run import said_by
+from tissuq.report.source_run import said_by
 
 from .conftest import write_specimen
 from .models import DECK, rows_of, started

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 import tissuq as tq
 from browser import FIRST_SCREEN, needs_chromium, opened
 from tissuq.assessment.uses import Use, Verdict
-from tissuq.report.laws import HEADERS
+from tissuq.experiments.units import stress_unit
+from tissuq.report.laws import columns_of_laws
 from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table
 from tissuq.report.specimen import specimen_result
 from tissuq.report.writer import write_result
@@ -76,7 +77,7 @@ def of_another_command(tmp_path_factory):
 def test_a_table_of_laws_is_seen_whole_on_a_screen_of_1200_pixels(tmp_path):
     widest = ["veronda-westmann", "1.496", "[1.253, 1.689]", "3", "0.202 %", "-15.3 ± 10.4", "0.9999", "0.941 %",
               "29.7 %", "96.6 % / 95.8 %"]  # fmt: skip
-    headers = [HEADERS[0], "modulus [kPa]", *HEADERS[2:]]
+    headers = list(columns_of_laws(stress_unit("kPa")))
     result = Result(command="fit", title="which law", subject="a test", tables=(Table(headers, [widest], "Laws"),))
     write_result(result, tmp_path)
     with opened(tmp_path / "report.html") as page:

@@ -9,9 +9,10 @@ import pytest
 import tissuq as tq
 from tissuq.experiments.units import stress_unit
 from tissuq.pictures import curves
+from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import described
 from tissuq.report.chart import chart_data
-from tissuq.report.figures import answer_figure, predictive_figure
+from tissuq.report.figures import predictive_figure
 
 KPA = stress_unit("kPa")
 OPTIONS = {"material": "mooney-rivlin", "discrepancy": "none", "noise_sd": 0.01}
@@ -171,7 +172,7 @@ def test_what_is_known_of_the_curves_is_not_computed_anew(posterior, monkeypatch
     original = curves.predict_bands
     monkeypatch.setattr(curves, "predict_bands", lambda *args, **options: calls.append(1) or original(*args, **options))
     assert chart_data({"none": posterior}, "none", KPA, found) == expected
-    answer_figure(posterior, KPA, computed=found["none"])
+    answer_on_new_figure(found["none"], KPA, is_narrow=False)
     predictive_figure({"none": posterior}, discrepancy=True, unit=KPA, computed=found)
     assert calls == []
     chart_data({"none": posterior}, "none", KPA)

@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import StressUnit
-from tissuq.report.comparison import comparison_figure, comparison_result, readable_comparison
+from tissuq.report.comparison import comparison_figure, comparison_result, comparison_table
 from tissuq.report.writer import write_result
 
 KPA = StressUnit("kPa", 1e-3)
@@ -35,7 +35,7 @@ def test_the_best_for_left_out_measurements_is_that_with_the_largest_elpd_and_ot
     best = sorted(table.index, key=lambda name: table["elpd"][name])[-1]
     numbers = {number.name: number.value for number in comparison_result(table, ["runs/a"], KPA).numbers}
     assert numbers["best for left-out measurements"] == best
-    for row in readable_comparison(table, KPA):
+    for row in comparison_table(table, KPA).rows:
         difference = float(row[5].split(" ± ")[0])
         assert difference == pytest.approx(table["elpd"][row[0]] - table["elpd"][best], abs=0.06)
         assert (row[5] == "0.0 ± 0.0") == (row[0] == best)
@@ -53,7 +53,7 @@ def test_what_is_not_known_is_said(table):
     names = ["log_evidence", "log_bayes_factor", "log_bayes_factor_low", "log_bayes_factor_high", "probability"]
     unknown.loc["yeoh", names] = np.nan
     assert "not known" in [text.get_text() for text in comparison_figure(unknown, KPA).axes[0].texts]
-    row = next(row for row in readable_comparison(unknown, KPA) if row[0] == "yeoh")
+    row = next(row for row in comparison_table(unknown, KPA).rows if row[0] == "yeoh")
     assert row[1:5] == [""] * 4
     nothing = table.copy()
     nothing[names] = np.nan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tissuq.report.coverage import coverage_result, readable_coverage
+from tissuq.report.coverage import coverage_result, coverage_table
 from tissuq.report.run_folder import RECIPE
 from tissuq.report.writer import write_result
 from tissuq.validation.coverage import CoverageSettings, summarise
@@ -49,7 +49,7 @@ def test_every_kind_of_campaign_has_its_page_tables_and_figures(changes, tmp_pat
     results = made_up(settings)
     write_result(coverage_result(settings, results), tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    _, rows = readable_coverage(summarise(settings, results))
+    rows = coverage_table(summarise(settings, results)).rows
     assert len(rows) == settings.cells
     assert all(cell in page for row in rows for cell in row)
     names = {

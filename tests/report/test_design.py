@@ -11,7 +11,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.next_test.candidates import target_named
-from tissuq.report.design import _best, design_figure, design_result, heading, readable_design
+from tissuq.report.design import _best, design_figure, design_result, design_table
 from tissuq.report.result import Result
 from tissuq.report.writer import write_result
 from tissuq.result_warning import ResultWarning
@@ -31,13 +31,14 @@ def study():
 
 def test_numbers_are_in_the_unit_of_the_data(study):
     first, second = study.targets
-    rows = readable_design(study, first)
+    table = design_table(study, first)
+    rows = table.rows
     best = study.table[study.table["target"] == "modulus"].iloc[0]
     assert rows[0][0] == best["candidate"]
     assert float(rows[0][1]) == pytest.approx(1000 * best["sd_after"], rel=0.005)
     assert rows[0][2].startswith(f"{100 * best['reduction']:.1f} %")
-    assert heading(study, first).endswith("kPa now")
-    assert "kPa" not in heading(study, second)
+    assert table.title.endswith("kPa now")
+    assert "kPa" not in design_table(study, second).title
     assert rows[-1][1:3] == ["", ""]
 
 

@@ -5,7 +5,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import StressUnit
-from tissuq.report.figures import answer_figure, marginal_figure, predictive_figure, save_figure
+from tissuq.pictures.answer import answer_on_new_figure
+from tissuq.report.figures import described_curves, marginal_figure, predictive_figure, save_figure
 
 KPA = StressUnit("kPa", 1e-3)
 
@@ -114,7 +115,7 @@ def test_dollar_signs_in_a_name_are_shown_as_they_are(specimen_study, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(("is_narrow", "width"), [(False, 1000), (True, 400)])
 def test_the_answer_has_the_width_of_a_page_and_letters_that_are_read_there(specimen_study, tmp_path, is_narrow, width):
-    figure = answer_figure(specimen_study.posteriors["auto"], KPA, is_narrow=is_narrow)
+    figure = answer_on_new_figure(described_curves(specimen_study.posteriors["auto"]), KPA, is_narrow=is_narrow)
     assert (96 * figure.get_size_inches()).tolist() == pytest.approx([width, 480])
     figure.draw_without_rendering()
     least = min(text.get_fontsize() for text in figure.findobj(lambda drawn: hasattr(drawn, "get_fontsize")))
@@ -139,7 +140,9 @@ def test_the_answer_to_several_tests_grows_by_rows():
     modes = ("uniaxial", "planar", "equibiaxial")
     tests = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.02, seed=1, mode=mode) for mode in modes]
     posterior = tq.fit(tests, discrepancy="none", noise_sd=0.02)
-    wide, narrow = (answer_figure(posterior, KPA, is_narrow=is_narrow) for is_narrow in (False, True))
+    wide, narrow = (
+        answer_on_new_figure(described_curves(posterior), KPA, is_narrow=is_narrow) for is_narrow in (False, True)
+    )
     assert 96 * wide.get_figheight() == pytest.approx(480)
     assert 96 * narrow.get_figheight() == pytest.approx(480 + 2 * 300)
     assert len({axis.get_subplotspec().colspan.start for axis in narrow.axes}) == 1

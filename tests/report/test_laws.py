@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 
 import tissuq as tq
-from tissuq.report.laws import HEADERS, _numbers, _readable, law_lead
+from tissuq.experiments.units import stress_unit
+from tissuq.report.laws import _numbers, columns_of_laws, law_lead
 from tissuq.studies.laws import LawStudy
 
 
@@ -87,6 +88,6 @@ def test_laws_that_are_as_good_as_the_best_are_named_where_they_are_few_and_a_sh
         4: "with its discrepancy as good: 3 others",
     }
     row = table.iloc[0]
-    column = HEADERS.index("share of discrepancy")
-    assert _readable("a", row, 1.0)[column] == "50 %"
-    assert _readable("a", row.replace(0.5, 1.7), 1.0)[column] == "> 100 %"
+    share = columns_of_laws(stress_unit("MPa"))["share of discrepancy"]
+    assert share(row) == "50 %"
+    assert share(row.replace(0.5, 1.7)) == "> 100 %"

@@ -13,11 +13,11 @@ import pytest
 import tissuq as tq
 from tissuq.assessment.uses import Use, Verdict
 from tissuq.report.prediction import prediction_figure, prediction_result
-from tissuq.report.prediction_tables import band_headers, readable_bands, readable_scores, score_headers
+from tissuq.report.prediction_tables import band_table, score_table
 from tissuq.report.result import Result
 from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted
-from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
+from tissuq.studies.run_settings import ComparedFile, PredictionSettings
 
 
 @pytest.fixture(scope="module")
@@ -39,20 +39,21 @@ def found(posterior, planar):
 
 
 def test_numbers_are_in_the_unit_of_the_run(found):
-    rows, headers = readable_bands(found), band_headers(found)
+    bands, scored = band_table(found), score_table(found, found.scores, found.data.name)
+    rows, headers = bands.rows, bands.headers
     assert len(headers) == len(rows[0])
     assert [row[0] for row in rows] == ["1", "1.1", "1.3", "2.2"]
     median = found.bands[0, True, False]["median"][2]
     assert float(rows[2][1]) == pytest.approx(median, rel=0.05)
     assert [row[-1] for row in rows] == ["yes", "yes", "yes", "no"]
-    scores = readable_scores(found)
-    assert "CRPS, kPa" in score_headers(found)
+    scores = scored.rows
+    assert "CRPS, kPa" in scored.headers
     assert float(scores[0][6]) == pytest.approx(found.scores["crps"][0], rel=0.01)
     assert [row[1] for row in scores] == ["all", "calibrated", "beyond"] * 2
 
 
 def test_of_many_points_some_are_read_from_end_to_end(posterior):
-    rows = readable_bands(predicted(posterior, stretch=np.linspace(0.8, 1.6, 101)))
+    rows = band_table(predicted(posterior, stretch=np.linspace(0.8, 1.6, 101))).rows
     assert len(rows) == 13
     assert (rows[0][0], rows[-1][0]) == ("0.8", "1.6")
 

@@ -247,3 +247,11 @@ def test_no_line_ends_before_the_sign_of_a_percentage(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert any("95 %" in line for line in lines)
     assert not any(line.lstrip().startswith("%") for line in lines)
+
+
+def test_a_table_of_columns_has_a_cell_of_every_row_in_each():
+    rows = [{"mean": 1.5, "name": "a"}, {"mean": 2.0, "name": "b"}]
+    table = Table.of(
+        rows, {"fit": lambda row: row["name"], "mean": lambda row: f"{row['mean']:.1f}"}, "Fits", note="kPa"
+    )
+    assert table == Table(["fit", "mean"], [["a", "1.5"], ["b", "2.0"]], "Fits", note="kPa")

@@ -6,8 +6,7 @@ import pytest
 import tissuq as tq
 from tissuq.experiments.units import StressUnit
 from tissuq.report.measured import named
-from tissuq.report.stability import stability_section
-from tissuq.report.summary import summary_table
+from tissuq.report.summary import stability_section, summary_table
 from tissuq.report.tables import interval, significant, write_csv, write_json
 
 ROW = {

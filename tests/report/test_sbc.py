@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tissuq.report.run_folder import RECIPE
-from tissuq.report.sbc import readable_ranks, sbc_result
+from tissuq.report.sbc import COLUMNS, sbc_result
 from tissuq.report.writer import write_result
 from tissuq.validation.sbc import SbcSettings, summarise_ranks
 
@@ -26,4 +26,4 @@ def test_the_page_says_what_is_wrong_and_what_failed(tmp_path):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 of 4 parameters is NOT calibrated" in page
     assert "1 fits failed" in page
-    assert all(cell in page for row in readable_ranks(table)[1] for cell in row)
+    assert all(cell(row) in page for row in table.to_dict("records") for cell in COLUMNS.values())

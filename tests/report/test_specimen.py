@@ -10,7 +10,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.report import specimen
-from tissuq.report.methods import methods_section
+from tissuq.report.measured import methods_section
 from tissuq.report.result import Table
 from tissuq.report.specimen import _of_what, specimen_answer, specimen_result
 from tissuq.report.writer import read_record, write_result

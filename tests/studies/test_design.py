@@ -10,7 +10,7 @@ from tissuq.report.run_folder import run_folder
 from tissuq.report.specimen import specimen_result
 from tissuq.report.writer import write_result
 from tissuq.studies.design import run_design
-from tissuq.studies.design_settings import CandidateSettings, DesignSettings
+from tissuq.studies.run_settings import CandidateSettings, DesignSettings
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
 

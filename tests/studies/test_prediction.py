@@ -13,7 +13,7 @@ from tissuq.prediction import moments
 from tissuq.report.specimen import specimen_result
 from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted, run_prediction
-from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings, stretches
+from tissuq.studies.run_settings import ComparedFile, PredictionSettings, stretches
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
 TRUTH = {"C10": 0.4, "C20": 0.03, "C30": 0.002}

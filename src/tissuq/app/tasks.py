@@ -98,7 +98,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
 
 def laws(request: Mapping[str, Any], say: Say) -> None:
     """Compare laws; say their table, and write the run."""
-    from tissuq.report.laws import HEADERS, law_lead, law_result, readable_laws
+    from tissuq.report.laws import law_lead, law_result, law_table
     from tissuq.report.run_folder import run_folder
     from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
@@ -115,12 +115,13 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     with run_folder(RUNS / folder_name, "fit", force=True) as folder:
         write_result(law_result(study, _sources(settings)), folder, target=RUNS / folder_name)
     shell = _shell("fit", *_files(request), options | {"out": f"runs/{folder_name}"})
+    table = law_table(study)
     say(
         "done",
         {
             "lead": law_lead(study),
-            "headers": [HEADERS[0], f"modulus [{study.unit.name}]", *HEADERS[2:]],
-            "rows": readable_laws(study),
+            "headers": table.headers,
+            "rows": table.rows,
             "skipped": dict(study.skipped),
             "warnings": [{"severity": w.severity, "text": in_shell(w)} for w in study.warnings],
             "run": folder_name,
@@ -133,12 +134,12 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
 def predict(request: Mapping[str, Any], say: Say) -> None:
     """Predict another loading mode from a run; say the bands, and write the folder."""
     from tissuq.report.prediction import prediction_result
-    from tissuq.report.prediction_tables import band_headers, readable_bands
+    from tissuq.report.prediction_tables import band_table
     from tissuq.report.run_folder import run_folder
     from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
     from tissuq.studies.predict_run import run_prediction
-    from tissuq.studies.prediction_settings import PredictionSettings
+    from tissuq.studies.run_settings import PredictionSettings
 
     options = _options(request, ("mode", "stretch", "stretch2"))
     run = RUNS / _run_name(request)
@@ -148,15 +149,15 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
     say("step", "writing the report")
     with run_folder(target, "predict", force=True) as folder:
         write_result(prediction_result(prediction, settings, target), folder)
-    points = settings.points_of(prediction.mode.name)
+    points, table = settings.points_of(prediction.mode.name), band_table(prediction)
     python = [*_imports(points), f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'
               f"{_points_in_python(settings, points)})", "print(prediction.table)"]  # fmt: skip
     say(
         "done",
         {
-            "headers": band_headers(prediction),
-            "rows": readable_bands(prediction),
-            "title": f"Stress in mode {prediction.mode.name}, {prediction.unit.name}",
+            "headers": table.headers,
+            "rows": table.rows,
+            "title": table.title,
             "warnings": list(map(in_shell, prediction.warnings)),
             "run": target.name,
             "report": f"{target.as_posix()}/report.html",

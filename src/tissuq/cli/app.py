@@ -12,22 +12,18 @@ from typer.core import TyperGroup
 from tissuq.cli import (
     calibrate,
     catalogue,
-    compare,
-    design,
     ensemble,
-    export,
     fit,
     inspect,
-    paper,
+    of_run,
     population,
-    predict,
     project,
     show,
     structure,
     study,
 )
 from tissuq.cli.command import Command
-from tissuq.cli.stopping import INTERRUPTED, TERMINATED, Stopped, end_on_request
+from tissuq.cli.progress import INTERRUPTED, TERMINATED, Stopped, end_on_request
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -80,11 +76,11 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show, "app": project.app,
     },
     "After a fit": {
-        "predict": predict.predict, "compare": compare.compare, "design": design.design, "export": export.export,
+        "predict": of_run.predict, "compare": show.compare, "design": of_run.design, "export": of_run.export,
         "structure": structure.structure, "ensemble": ensemble.ensemble,
     },
     "Several specimens, expensive models": {"population": population.population, "calibrate": calibrate.calibrate},
-    "How far to trust it": {"paper": paper.paper, "check": catalogue.check},
+    "How far to trust it": {"paper": study.paper, "check": catalogue.check},
     "What there is": {
         "materials": catalogue.materials, "modes": catalogue.modes, "discrepancies": catalogue.discrepancies,
         "datasets": catalogue.datasets, "doctor": project.doctor, "schema": catalogue.schema,

@@ -8,8 +8,7 @@ from typing import Any
 
 from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
-from tissuq.cli.named_again import check_named_again
-from tissuq.cli.running import Written
+from tissuq.cli.running import SolverOptions, Written
 from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.option import option
@@ -17,17 +16,11 @@ from tissuq.studies.option import option
 __all__ = ["calibrate"]
 
 
-class CalibrateOptions(Written):
+class CalibrateOptions(SolverOptions, Written):
     """How the model is run."""
 
     workers: int = option(1, "Processes that run the model.", ge=1)
-    max_jobs: int | None = option(
-        None, "With --model: runs of the solver at a time, as many as licences [one a core].", ge=1
-    )
-    timeout: float | None = option(None, "With --model: seconds after which a run is stopped [never].", unit="s", ge=0)
-    retries: int = option(0, "With --model: times that a failed run is made again, as for a licence.", ge=0)
-    keep: bool = option(False, "With --model: keep the solver's files of every run.")
-    abaqus: str = option("", "With --model: program that opens .odb files, as its 'python' [first word of --command].")
+    keep: bool = option(False, "Keep the solver's files of every run.")
     runs_in: Path | None = option(
         None, "Folder of the runs of the model, which a repeated command reuses [OUT-forward-runs]."
     )
@@ -43,7 +36,7 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     if not (call.config or "priors" in call.stated or "prior_run" in call.stated):
         raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5), or --prior-run.")
     settings = call.loaded(rivals=("forward", "umbridge"))
-    _check_named_again(call, settings)
+    call.check_named_again(settings)
     target = call.target(Path("runs") / Path(settings.files[0]).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
     how, running = call.how, dict[str, Any]()
@@ -56,19 +49,3 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     print(f"Forward runs: {runs_in}")
     call.carried_out(target, lambda step: study, lambda study: calibration_result(study, call.beside))
     not_converged([] if study.calibration.converged else ["the calibration"])
-
-
-def _check_named_again(call: Call[CalibrationSettings, CalibrateOptions], settings: CalibrationSettings) -> None:
-    """Refuse to run code, or to ask a server, that a recipe names and the command line does not."""
-    if settings.forward and "forward" not in call.stated:
-        raise InputError(
-            f"{call.config} names the forward model '{settings.forward}', whose code runs only if you name it: add "
-            f"--forward {settings.forward}"
-        )
-    if settings.umbridge and "umbridge" not in call.stated:
-        raise InputError(
-            f"{call.config} names the UM-Bridge server {settings.umbridge}, which is asked only when you name it: add "
-            f"--umbridge {settings.umbridge}"
-        )
-    if call.config and settings.models:
-        check_named_again(call.config, settings, call.stated, {"quantities": "--qoi", "along": "--along"})

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Self, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
 
 import typer
 
 from tissuq.cli.progress import Monitor
-from tissuq.cli.running import Configured, LawOfRun, Running, Written
+from tissuq.cli.running import Configured, IntoFolder, LawOfRun, Running, Written
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings
 from tissuq.studies.settings import load_settings
@@ -21,6 +22,7 @@ from tissuq.studies.settings import load_settings
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.report.result import Record, Result
+    from tissuq.studies.model_settings import ModelSettings
 
 __all__ = ["Call", "not_converged"]
 
@@ -84,10 +86,6 @@ class Call(Generic[Kind, How]):
         """Return `loaded` settings of another class, which may add what only a file can say."""
         return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
 
-    def with_config(self, file: Path) -> Self:
-        """Return the call as if the file of settings had been named."""
-        return replace(self, how=self.how.model_copy(update={"config": file}))
-
     def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:
         """Return what shows the tasks of a campaign, which are kept in a folder as they are done."""
         self.monitor.folder = folder
@@ -103,6 +101,35 @@ class Call(Generic[Kind, How]):
             )
         if not (source or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
+
+    def check_named_again(self, settings: ModelSettings, *, is_dry: bool = False) -> None:
+        """Refuse to run programs, to ask servers or to read files elsewhere that only a recipe names.
+
+        Raises
+        ------
+        InputError
+            When the command line does not name them, too; the message has the options to type.
+        """
+        from tissuq.mechanics.user_law import UserCode
+        from tissuq.studies.settings import is_inside
+
+        if self.config is None:
+            return
+        programs = {name: getattr(settings, name, None) for name in ("forward", "umbridge", "command")}
+        missing = [f"--{name} {shlex.quote(text)}" for name, text in programs.items()
+                   if text and not self.stated.get(name)]  # fmt: skip
+        for setting, option in (("quantities", "--qoi"), ("along", "--along")):
+            for name, text in getattr(settings, setting, {}).items():
+                if UserCode.named(text) and name not in self.stated.get(setting, {}):
+                    missing.append(f"{option} {shlex.quote(f'{name}={text}')}")
+        missing, inside = [] if is_dry else missing, self.beside.resolve()
+        if "also" not in self.stated and not all(is_inside(inside / file, inside) for file in settings.also):
+            missing += [f"--also {shlex.quote(file)}" for file in settings.also]
+        if missing:
+            raise InputError(
+                f"'{self.config}' names programs that would be run, a server, or files outside of its folder. They are "
+                f"used only if named here, too; if you know them, add {' '.join(missing)}."
+            )
 
     @cached_property
     def law(self) -> Material | None:
@@ -121,7 +148,7 @@ class Call(Generic[Kind, How]):
         """Return the folder that is to be written, once it may be; ``default`` unless another is named."""
         from tissuq.report.run_folder import check_apart, check_target
 
-        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        assert isinstance(self.how, IntoFolder)  # noqa: S101 (only such commands have a folder)
         folder = self.how.out or default
         if apart_from is not None:
             check_apart(folder, apart_from)
@@ -147,15 +174,18 @@ class Call(Generic[Kind, How]):
         steps : int, optional
             Their number, where it is known.
         """
+        from tissuq.report.run_folder import run_folder
         from tissuq.report.writer import write_result
 
-        records: list[Record] = []
-
-        def write(study: Study, *, folder: Path, figures: bool) -> None:
-            records.append(write_result(result_of(study), folder, figures=figures, target=target))
-
-        study = self.written(target, run, write, steps)
-        self._show(records[0], target)
+        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        with self.monitor.steps(steps) as step:
+            study = run(step)
+            step("writing")
+            with run_folder(target, self.command, force=self.how.force) as folder:
+                result = result_of(study)
+                record = write_result(result, folder, figures=self.how.figures, target=target)
+                self.monitor.write_log(folder, result.warnings)
+        self._show(record, target)
         return study
 
     def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
@@ -177,25 +207,6 @@ class Call(Generic[Kind, How]):
         for number in numbers if self.monitor.is_quiet else ():
             remark = f", {number['remark']}" if number["remark"] else ""
             print(f"{number['name']}: {number['text']}{remark}", file=self.out)
-
-    def written(
-        self,
-        target: Path,
-        run: Callable[[Callable[[str], None]], Study],
-        write: Callable[..., None],
-        steps: int | None = None,
-    ) -> Study:
-        """Return what a run gives, once ``write`` has put it into a ``folder``, with ``figures`` or without."""
-        from tissuq.report.run_folder import run_folder
-
-        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
-        with self.monitor.steps(steps) as step:
-            study = run(step)
-            step("writing")
-            with run_folder(target, self.command, force=self.how.force) as folder:
-                write(study, folder=folder, figures=self.how.figures)
-                self.monitor.write_log(folder, getattr(study, "warnings", ()))
-        return study
 
 
 def _shown(files: Any) -> str:

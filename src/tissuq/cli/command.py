@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext, redirect_stdout
-from importlib import import_module
+from dataclasses import replace
 from inspect import Parameter, Signature
 from io import StringIO
 from types import MappingProxyType
@@ -14,11 +14,10 @@ import typer
 from typer.core import TyperCommand
 
 from tissuq.cli.call import Call
-from tissuq.cli.progress import Monitor
+from tissuq.cli.progress import Monitor, stopping
 from tissuq.cli.running import Running, Verbosity
-from tissuq.cli.stopping import stopping
 from tissuq.studies.option import Settings, Slot, slots_of, stated
-from tissuq.studies.settings import load_settings
+from tissuq.studies.settings import imported, load_settings
 
 __all__ = ["CONFIGURED", "FORMER_NAMES", "Command", "command", "settings_of", "todays_names"]
 
@@ -63,7 +62,7 @@ CONFIGURED: dict[str, tuple[type[Settings], str]] = {}
 
 
 def command(
-    settings: type[Kind], running: type[How], whole: str = ""
+    settings: type[Kind], running: type[How], whole: str = "", out: str = ""
 ) -> Callable[[Callable[[Call[Kind, How]], None]], Any]:
     """Make a command of what carries out a `Call`.
 
@@ -75,12 +74,16 @@ def command(
         Its other options.
     whole : str
         MODULE:NAME of the class of what its file may hold, where that is more than its options.
+    out : str
+        The help of ``--out``, where the folder is called or used in another way than runs are.
     """
 
     def decorate(carry_out: Callable[[Call[Kind, How]], None]) -> Any:
         has_config = "config" in running.model_fields
         of_settings = list(slots_of(settings, is_optional=has_config))
         of_running = [slot.in_group("Running") for slot in slots_of(running)]
+        if out:
+            of_running = [replace(slot, help=out) if slot.name == "out" else slot for slot in of_running]
 
         def run(**values: Any) -> None:
             how, typed_how = stated(of_running, values)
@@ -126,8 +129,7 @@ def settings_of(name: str) -> type[Settings] | None:
     kind, location = CONFIGURED.get(name, (None, ""))
     if not location:
         return kind
-    module, _, of_file = location.partition(":")
-    of_whole_file: type[Settings] = getattr(import_module(module), of_file)
+    of_whole_file: type[Settings] = imported(location)
     return of_whole_file
 
 

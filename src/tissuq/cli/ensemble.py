@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
-from tissuq.cli.named_again import check_named_again
-from tissuq.cli.running import SCHEDULER, Configured, LawOfRun
+from tissuq.cli.running import SCHEDULER, Configured, LawOfRun, SolverOptions
 from tissuq.errors import InputError
 from tissuq.studies.model_settings import EnsembleSettings
 from tissuq.studies.option import argument, option
@@ -28,18 +27,14 @@ FREE = frozenset({"quantities", "finer_model", "cell_ratio", "mesh_order"})
 """Settings that may be others when an ensemble goes on."""
 
 
-class EnsembleOptions(LawOfRun, Configured):
+class EnsembleOptions(LawOfRun, SolverOptions, Configured):
     """Where draws come from, and how the solver is run."""
 
     run: Path | None = argument(None, "Run folder of tissuq fit.")
     out: Path | None = option(None, "Folder of the ensemble [runs/RUN-MODEL].")
-    max_jobs: int | None = option(None, "Runs of the solver at a time, as many as licences [one a core].", ge=1)
     scheduler: str | None = option(None, SCHEDULER)
-    timeout: float | None = option(None, "Seconds after which a run is stopped [never].", unit="s", ge=0)
-    retries: int = option(0, "Times that a failed run is made again, as for a licence.", ge=0)
     again: bool = option(False, "Make runs again that failed earlier.")
     keep: bool = option(True, "Keep the solver's files of every draw.")
-    abaqus: str = option("", "Program that opens .odb files, as its 'python' [first word of --command].")
     dry_run: bool = option(False, "Show what changes in the deck, and run nothing.")
     figures: bool = option(True, "Draw the figures.")
 
@@ -103,8 +98,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
         if call.config is None and not value:
             raise InputError(f"give {example}: what the model is asked for.")
     settings = call.loaded(model=model, materials=materials or None)
-    if call.config:
-        check_named_again(call.config, settings, stated, {"quantities": "--qoi"}, is_dry=call.how.dry_run)
+    call.check_named_again(settings, is_dry=call.how.dry_run)
     return settings
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from filecmp import cmp
 from functools import partial
 from pathlib import Path
@@ -47,7 +48,7 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
 
     paths: list[Path] = call.stated.pop("file", [])
     if call.config is None and [path.suffix for path in paths] == [".toml"]:
-        call, paths = call.with_config(paths[0]), []
+        call, paths = replace(call, how=call.how.model_copy(update={"config": paths[0]})), []
     files = files_of(paths)
     read_as = {name: call.stated.pop(name) for name in ReadingSettings.model_fields if name in call.stated}
     modes, noise = read_as.pop("mode", None), call.stated.pop("noise_sd", None)

@@ -8,20 +8,13 @@ from pathlib import Path
 from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
 from tissuq.cli.running import Written
-from tissuq.studies.option import option
 from tissuq.studies.population_settings import PopulationSettings
 
 __all__ = ["population"]
 
 
-class PopulationOptions(Written):
-    """How a population is written."""
-
-    out: Path | None = option(None, "Folder for the run [runs/population].")
-
-
-@command(PopulationSettings, PopulationOptions)
-def population(call: Call[PopulationSettings, PopulationOptions]) -> None:
+@command(PopulationSettings, Written, out="Folder for the run [runs/population].")
+def population(call: Call[PopulationSettings, Written]) -> None:
     """Identify a population from its specimens, every specimen within it, and what to expect of a new specimen."""
     from tissuq.mechanics import material_named
     from tissuq.report.population import population_result

@@ -1,9 +1,10 @@
-"""How a command gets on: shown on a terminal, told in lines elsewhere, and kept for the log of the run."""
+"""How a command gets on: shown on a terminal, told in lines elsewhere, kept for the log; and what is said at a stop."""
 
 from __future__ import annotations
 
 import os
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -12,12 +13,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from threading import Timer
 from time import monotonic
+from types import FrameType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-__all__ = ["LOG", "Monitor"]
+__all__ = ["INTERRUPTED", "LOG", "TERMINATED", "Monitor", "Stopped", "end_on_request", "stopping"]
 
 LOG = "tissuq.log"
 """The file of a run that says how it came about."""
@@ -29,6 +31,9 @@ NONE_DONE = 60.0
 """Seconds after which it is told that no task of a campaign is done: batch jobs may wait, or may have failed."""
 SWITCH = "TISSUQ_PROGRESS"
 """The environment variable that says ``off`` where such lines would be in the way."""
+INTERRUPTED = 130
+"""The exit status that Typer gives to Ctrl-C."""
+TERMINATED = 128 + signal.SIGTERM
 
 
 @dataclass
@@ -222,3 +227,30 @@ def _left(seconds: float | None) -> str:
         return ""
     minutes, remaining = divmod(round(seconds), 60)
     return f"{minutes // 60} h {minutes % 60:02d} min left, " if minutes >= 60 else f"{minutes}:{remaining:02d} left, "
+
+
+class Stopped(SystemExit):
+    """The end of a command that has said what is done."""
+
+
+@contextmanager
+def stopping(monitor: Monitor) -> Iterator[None]:
+    """Say what is done, and how to go on, where a command is stopped."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit) as end:
+        status = end.code if isinstance(end, SystemExit) else INTERRUPTED
+        if status not in (INTERRUPTED, TERMINATED):
+            raise
+        print(f"tissuq: {monitor.stopped()}", file=sys.stderr)
+        raise Stopped(status) from None
+
+
+def end_on_request() -> None:
+    """End on a request to terminate as on an error, so that nothing half written is left."""
+    signal.signal(signal.SIGTERM, _stop)
+
+
+def _stop(number: int, _: FrameType | None) -> None:
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(TERMINATED)

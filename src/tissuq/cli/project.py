@@ -10,7 +10,7 @@ import typer
 from tissuq.errors import InputError
 
 if TYPE_CHECKING:
-    from tissuq.studies.installation import Extra, Package, Program
+    from tissuq.studies.installation import Extra
 
 __all__ = ["app", "doctor", "init"]
 
@@ -37,36 +37,26 @@ def doctor() -> None:
     print(f"tissuq {metadata.version('tissuq')}, Python {platform.python_version()}, {platform.platform()}")
     needed = installation.needed()
     print("\nNeeded")
-    _print_packages(needed)
+    for package in needed:
+        problem = "" if package.is_enough else f"   needs {package.least} or later"
+        print(f"    {package.name:<20} {package.version or 'not installed'}{problem}")
     print("\nExtras")
     for extra in installation.extras():
-        _print_extra(extra)
+        print(f"    {extra.name:<10} {extra.purpose}\n               {_state_of(extra)}")
     print("\nOther programs (none is needed to fit)")
     for program in installation.programs():
-        _print_program(program)
+        print(f"    {program.name:<10} {program.purpose}\n               {program.path or 'not on the PATH'}")
     lacking = [package for package in needed if not package.is_enough]
     if lacking:
         names = " ".join(f"'{package.name}>={package.least}'" for package in lacking)
         raise InputError(f"{len(lacking)} needed packages are not here or too old. Type: pip install --upgrade {names}")
 
 
-def _print_packages(packages: list[Package]) -> None:
-    for package in packages:
-        problem = "" if package.is_enough else f"   needs {package.least} or later"
-        print(f"    {package.name:<20} {package.version or 'not installed'}{problem}")
-
-
-def _print_extra(extra: Extra) -> None:
-    print(f"    {extra.name:<10} {extra.purpose}")
-    if extra.is_installed:
-        print(f"               {', '.join(f'{package.name} {package.version}' for package in extra.packages)}")
-    else:
-        lacking = ", ".join(package.name for package in extra.packages if not package.is_enough)
-        print(f"               not installed ({lacking}): pip install 'tissuq[{extra.name}]'")
-
-
-def _print_program(program: Program) -> None:
-    print(f"    {program.name:<10} {program.purpose}\n               {program.path or 'not on the PATH'}")
+def _state_of(extra: Extra) -> str:
+    lacking = ", ".join(package.name for package in extra.packages if not package.is_enough)
+    if lacking:
+        return f"not installed ({lacking}): pip install 'tissuq[{extra.name}]'"
+    return ", ".join(f"{package.name} {package.version}" for package in extra.packages)
 
 
 def app(

@@ -6,7 +6,10 @@ from pathlib import Path
 
 from tissuq.studies.option import Settings, option
 
-__all__ = ["SCHEDULER", "Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Verbosity", "Written"]
+__all__ = [
+    "SCHEDULER", "Campaign", "Configured", "IntoFolder", "LawOfRun", "OfRun", "Running", "SolverOptions", "Verbosity",
+    "Written",
+]  # fmt: skip
 
 SCHEDULER = "Address of a Dask scheduler to use instead, or slurm:memory=4GB,walltime=02:00:00 for batch jobs."
 
@@ -28,12 +31,17 @@ class Configured(Verbosity):
     config: Path | None = option(None, "run.toml of an earlier run to repeat.")
 
 
-class Written(Configured):
+class IntoFolder(Running):
     """A command that writes a folder, whole or not at all."""
 
     out: Path | None = option(None, "Folder for the run [runs/NAME].")
-    figures: bool = option(True, "Draw the figures.")
     force: bool = option(False, "Replace an existing folder of the same kind.")
+
+
+class Written(IntoFolder, Configured):
+    """A command whose folder is a run, with its figures and its recipe."""
+
+    figures: bool = option(True, "Draw the figures.")
 
 
 class LawOfRun(Running):
@@ -46,6 +54,15 @@ class LawOfRun(Running):
 
 class OfRun(LawOfRun, Written):
     """A command that begins from such a run, and writes a folder."""
+
+
+class SolverOptions(Running):
+    """A command that runs the solver of the user's own finite-element model."""
+
+    max_jobs: int | None = option(None, "Runs of the solver at a time, as many as licences [one a core].", ge=1)
+    timeout: float | None = option(None, "Seconds after which the solver is stopped [never].", unit="s", ge=0)
+    retries: int = option(0, "Times that a failed run of the solver is made again, as for a licence.", ge=0)
+    abaqus: str = option("", "Program that opens .odb files, as its 'python' [first word of --command].")
 
 
 class Campaign(Configured):

@@ -1,4 +1,4 @@
-"""``tissuq study``: campaigns over many data sets."""
+"""``tissuq study``: campaigns over many data sets; ``tissuq paper``: the study of the paper."""
 
 from __future__ import annotations
 
@@ -9,19 +9,26 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tissuq.cli.call import Call
+from tissuq.cli.call import Call, not_converged
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import Command, command
-from tissuq.cli.running import Campaign
+from tissuq.cli.running import Campaign, Written
 from tissuq.errors import InputError
-from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, StructureStudyOptions, TissueOptions
+from tissuq.studies.campaign_settings import (
+    CoverageOptions,
+    PaperOptions,
+    SbcOptions,
+    StructureStudyOptions,
+    TissueOptions,
+)
 from tissuq.studies.option import option
+from tissuq.studies.option_texts import range_of
 
 if TYPE_CHECKING:
     from tissuq.report.result import Result
     from tissuq.studies.stream import Campaign as CampaignOfTasks
 
-__all__ = ["study"]
+__all__ = ["paper", "study"]
 
 study = typer.Typer(name="study", no_args_is_help=True, rich_markup_mode=None, help="Campaigns over many data sets.")
 
@@ -84,8 +91,7 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
     from tissuq.report.tissues import tissue_result
     from tissuq.validation.tissues import TissueSettings, run_benchmark
 
-    settings = call.loaded_as(TissueSettings)
-    _carry_out(call, settings, _folder(call, "tissues"), run_benchmark, tissue_result)
+    _carry_out(call, call.loaded_as(TissueSettings), _folder(call, "tissues"), run_benchmark, tissue_result)
 
 
 @study.command("structures", cls=Command)
@@ -120,3 +126,25 @@ def _carry_out(
         write_campaign_recipe(folder, settings)
         results = run(settings, folder, pool=pool, step=step)
     call.put_into(folder, result_of(settings, results))
+
+
+class PaperRunning(Written):
+    """How the study is written."""
+
+    stretch_range: tuple[float, float] | None = option(
+        None, "Stretches LOW:HIGH [0.5:4.25].", takes=str, parse=range_of("--stretch-range", "0.5:4.25")
+    )
+
+
+@command(PaperOptions, PaperRunning, "tissuq.validation.paper:PaperSettings", out="Folder for the run [runs/paper].")
+def paper(call: Call[PaperOptions, PaperRunning]) -> None:
+    """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
+    from tissuq.report.paper import paper_result
+    from tissuq.validation.paper import PaperSettings, run_paper
+    from tissuq.validation.paper.study import steps_of
+
+    low, high = call.how.stretch_range or (None, None)
+    settings = call.loaded_as(PaperSettings, stretch_low=low, stretch_high=high)
+    target = call.target(Path("runs/paper"))
+    study = call.carried_out(target, lambda step: run_paper(settings, step), paper_result, steps_of(settings))
+    not_converged(study.not_converged)

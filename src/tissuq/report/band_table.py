@@ -1,8 +1,10 @@
-"""Tables of bands in words: what a row says of an interval, of the sources of its variance and of the mesh."""
+"""Bands of what draws give, along time or travel: a table of them in words, the sources of its variance, the mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,22 +17,7 @@ from tissuq.report.tables import significant
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "LABELS",
-    "SHARES",
-    "band_cells",
-    "handy_unit",
-    "is_mesh_free",
-    "largest_share",
-    "last_row",
-    "mesh_change",
-    "mesh_ratio",
-    "of_sources",
-    "percent_of",
-    "prefix_of",
-    "share_cell",
-    "shares_in",
-]
+__all__ = ["LABELS", "SHARES", "Bands", "handy_unit", "percent_of"]
 
 UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
 SHARES = {
@@ -58,68 +45,118 @@ def handy_unit(table: pd.DataFrame, unit: str) -> tuple[str, float]:
     return next((pair for pair in UNITS[unit] if largest * pair[1] >= 1), UNITS[unit][-1])
 
 
-def is_mesh_free(table: Collection[str] | pd.DataFrame) -> bool:
-    """Return whether there are bands for cells without size."""
-    return "mesh_free_mean" in table
-
-
-def prefix_of(table: Collection[str] | pd.DataFrame) -> str:
-    """Return what the columns of the band begin with that is shown: that for cells without size, where there is one."""
-    return "mesh_free_" if is_mesh_free(table) else ""
-
-
-def mesh_ratio(row: Mapping[str, Any]) -> float:
-    """Return what a force on the mesh is multiplied with for cells without size; 1 where that is not known."""
-    return float(row["mesh_free_mean"] / row["mean"]) if "mesh_free_mean" in row else 1.0
-
-
-def shares_in(table: Collection[str] | pd.DataFrame, *, is_shared: bool) -> list[str]:
-    """Return the sources of variance that a table, or a row of one, has shares of, where there are several."""
-    sources = [name for name in SHARES if name in table and name != "noise"]
-    return sources if is_shared or len({*sources} - {"mesh"}) > 2 else []
-
-
-def of_sources(table: pd.DataFrame) -> str:
-    """Return what is said of sources that draws have besides parameters and discrepancy."""
-    return IN_THE_OTHERS if {"extrapolation", "test_scale"}.isdisjoint(table.columns) else OF_SOURCES
-
-
-def last_row(table: pd.DataFrame) -> dict[str, Any]:
-    """Return the last row of a table that has a band."""
-    return {str(key): value for key, value in table[table["draws"] > 1].iloc[-1].items()}
-
-
 def percent_of(draws: float) -> str:
     """Return the probability of the band of so many draws, in words."""
     return f"{100 * band_probability(int(draws)):.0f} %"
 
 
-def band_cells(row: Mapping[str, Any], factor: float = 1.0, prefix: str = "") -> list[str]:
-    """Return mean, standard deviation and ends of a band, times a factor, in words."""
-    mean, sd, low, high = (
-        significant(row.get(f"{prefix}{name}", np.nan) * factor) for name in ("mean", "sd", "low", "high")
-    )
-    return [mean, sd, f"{low} to {high}"]
+@dataclass(frozen=True)
+class Bands:
+    """Bands of a quantity, a row for each time or travel.
+
+    Attributes
+    ----------
+    table : pandas.DataFrame
+        Of `ModelEnsemble.table` or `Simulation.table`.
+    is_shared : bool
+        Whether the shares of parameters and discrepancy were computed.
+    unit : str
+        In which numbers are given.
+    factor : float
+        How many of it are one of those of the table.
+    """
+
+    table: pd.DataFrame
+    is_shared: bool
+    unit: str = ""
+    factor: float = 1.0
+
+    @property
+    def of_several(self) -> pd.DataFrame:
+        """The rows that have a band."""
+        return self.table[self.table["draws"] > 1]
+
+    @cached_property
+    def last(self) -> dict[str, Any]:
+        """The last of these."""
+        return {str(key): value for key, value in self.of_several.iloc[-1].items()}
+
+    @property
+    def is_mesh_free(self) -> bool:
+        """Whether there are bands for cells without size."""
+        return "mesh_free_mean" in self.table
+
+    @property
+    def prefix(self) -> str:
+        """What the columns of the band begin with that is shown: that for cells without size, where there is one."""
+        return "mesh_free_" if self.is_mesh_free else ""
+
+    def mesh_ratio(self, row: Any) -> Any:
+        """Return what a row on the mesh, or all, is multiplied with for cells without size; 1 where not known."""
+        return row["mesh_free_mean"] / row["mean"] if self.is_mesh_free else 1.0
+
+    @property
+    def mesh_change(self) -> str:
+        """By how much the last row changes for cells without size."""
+        return f"{100 * (self.mesh_ratio(self.last) - 1):+.1f} %"
+
+    @property
+    def shares(self) -> list[str]:
+        """The sources of variance besides noise that the table has shares of, where there are several."""
+        sources = [name for name in SHARES if name in self.table and name != "noise"]
+        return sources if self.is_shared or len({*sources} - {"mesh"}) > 2 else []
+
+    @property
+    def of_sources(self) -> str:
+        """What is said of sources that draws have besides parameters and discrepancy."""
+        return IN_THE_OTHERS if {"extrapolation", "test_scale"}.isdisjoint(self.table.columns) else OF_SOURCES
+
+    @property
+    def percent(self) -> str:
+        """The probability of the band where most draws have got."""
+        return percent_of(self.table["draws"].max())
+
+    def number(self, name: str) -> Number:
+        """Return the last row as a number to take home."""
+        mean, low, high = (self.last[f"{self.prefix}{end}"] * self.factor for end in ("mean", "low", "high"))
+        return Number(name, mean, low, high, self.unit, f"{percent_of(self.last['draws'])} band")
+
+    def largest_share(self, names: Collection[str], of: str = "the variance") -> list[Number]:
+        """Return the source with the largest share of the variance, where those of several are known."""
+        row, known = self.last, [name for name in names if np.isfinite(self.last[name])]
+        if len(known) < 2:
+            return []
+        largest = max(known, key=lambda name: float(row[name]))
+        remark = f"{_share_cell(row, largest)} of {of}"
+        if row[largest] - SIGNIFICANT_ERRORS * row[f"{largest}_error"] > 1:
+            remark = "part of which another source takes back: what they do together is the band"
+        return [Number("uncertain mostly by", LABELS[largest], remark=remark)]
+
+    def headers(self, along: str, mean: str, percent: str, shares: Sequence[str]) -> list[str]:
+        """Return the heads of the columns of `cells`: along what, and what the mean is called."""
+        without = ["without discrepancy", percent] * ("without_mean" in self.table)
+        labels = [LABELS[name] for name in shares]
+        return [along, "draws", mean, "sd", percent, *labels, *without, *["on this mesh"] * self.is_mesh_free]
+
+    def cells(self, row: dict[str, Any], along: str, shares: Sequence[str]) -> list[str]:
+        """Return a row in words: along what, number of draws, band, shares, and what else there is of it."""
+        cells = [along, str(int(row["draws"])), *self.band(row), *(_share_cell(row, name) for name in shares)]
+        if "without_mean" in row:
+            mean, _, ends = self.band(row, "without_")
+            cells += [mean, ends]
+        return [*cells, *[significant(row["mean"] * self.factor)] * self.is_mesh_free]
+
+    def band(self, row: dict[str, Any], prefix: str | None = None) -> list[str]:
+        """Return mean, standard deviation and ends of a band in words; of one of the mesh for cells without size."""
+        factor = self.factor * (1.0 if prefix is None else self.mesh_ratio(row))
+        prefix = self.prefix if prefix is None else prefix
+        mean, sd, low, high = (
+            significant(row.get(f"{prefix}{name}", np.nan) * factor) for name in ("mean", "sd", "low", "high")
+        )
+        return [mean, sd, f"{low} to {high}"]
 
 
-def share_cell(row: Mapping[str, Any], name: str) -> str:
-    """Return the share of the variance that is due to a source, with its standard error, in words."""
+def _share_cell(row: dict[str, Any], name: str) -> str:
+    """Return the share of the variance that is due to a source, with its standard error."""
     share, error = row[name], row[f"{name}_error"]
     return "" if np.isnan(share) else f"{100 * share:.0f} ± {100 * error:.0f} %"
-
-
-def largest_share(row: Mapping[str, Any], names: Collection[str], of: str = "the variance") -> list[Number]:
-    """Return the source with the largest share of the variance, where those of several are known."""
-    known = [name for name in names if np.isfinite(row[name])]
-    if len(known) < 2:
-        return []
-    largest = max(known, key=lambda name: float(row[name]))
-    remark = f"{share_cell(row, largest)} of {of}"
-    if row[largest] - SIGNIFICANT_ERRORS * row[f"{largest}_error"] > 1:
-        remark = "part of which another source takes back: what they do together is the band"
-    return [Number("uncertain mostly by", LABELS[largest], remark=remark)]
-
-
-def mesh_change(row: Mapping[str, Any]) -> str:
-    """Return by how much what is computed changes for cells without size, in words."""
-    return f"{100 * (mesh_ratio(row) - 1):+.1f} %"

@@ -10,20 +10,23 @@ import numpy as np
 
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
-from tissuq.emulation import Calibration, DeckForward, FileForward, SeveralModels
+from tissuq.emulation import DeckForward, SeveralModels
 from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
+from tissuq.report.inputs import Copies
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, known_number, significant
 from tissuq.report.writer import posterior_files
 from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy
 
-__all__ = ["HEADERS", "calibration_result", "readable_calibration"]
+__all__ = ["calibration_result"]
 
+WORST_RUNS = 8
+"""Rows of the page's table of runs that were left out."""
 LARGE_SHARE = 0.1
 """Share of the variance of a parameter that is due to the emulator, beyond which more runs are worth while."""
 BY_EMULATOR = (
@@ -42,8 +45,6 @@ SOBOL = (
     "Share of the variance of the outputs, where all parameters vary over their priors, that a parameter explains "
     "alone (first) and with its interactions (total): Sobol's indices from the emulator."
 )
-HEADERS = ["parameter", "mean", "sd", "95 % interval", "ESS", "by emulator"]
-"""Of `readable_calibration`."""
 
 
 def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result:
@@ -57,7 +58,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     """
     calibration, settings = study.calibration, study.settings
     copies, relocated = _copies(study, beside)
-    files = copies | _tables(study) | {"calibration.nc": calibration.save}
+    files = copies.files | _tables(study) | {"calibration.nc": calibration.save}
     if study.posterior is not None:
         files |= posterior_files({NoDiscrepancy.name: study.posterior})
     model, runs = study.forward.name, len(calibration.runs)
@@ -82,10 +83,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
             "answer", lambda: band_figure(calibration, study.data, is_narrow=True),
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
         ),
-        tables=(
-            Table(HEADERS, readable_calibration(study), f"{model}: {runs} runs",
-                  note=f"{BY_EMULATOR} Emulator, {calibration.check}."),
-        ),
+        tables=(_parameters(study),),
         sections=_sections(study),
         warnings=tuple(study.warnings),
         files=files,
@@ -132,24 +130,27 @@ def _next_step(study: CalibrationStudy) -> str:
     )
 
 
-def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the user's files, so that the run can be repeated, and the settings that name the copies."""
-    sources = [beside / file for file in study.settings.files]
-    folders = _folders(len(sources))
-    copies: dict[str, Any] = {
-        f"{folder}/{source.name}": source for folder, source in zip(folders, sources, strict=True)
-    }
-    relocated: dict[str, Any] = {"files": tuple(copies)}
-    if decks := _decks(study):
-        of_models, relocated_models = _model_copies(decks, study.settings, beside)
-        return copies | of_models, relocated | relocated_models
-    if study.settings.forward is None:
-        return copies, relocated
-    match, file = LAW.fullmatch(study.settings.forward), FileForward(study.settings.forward).file
-    if match and file:
-        copies[f"{INPUT}/{file.name}"] = file
-        return copies, relocated | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
-    return copies, relocated | {"forward": study.settings.forward}
+def _copies(study: CalibrationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:
+    """Return copies of the user's files, so that the run can be repeated, and the settings that name them."""
+    settings, copies, decks = study.settings, Copies(), _decks(study)
+    folders = _folders(len(settings.files))
+    files = [copies.of_file(beside / file, folder) for file, folder in zip(settings.files, folders, strict=True)]
+    relocated: dict[str, Any] = {"files": tuple(files)}
+    if not decks:
+        return copies, relocated | ({"forward": copies.of_code(settings.forward)} if settings.forward else {})
+    models, also_copies = list[str](), list[str]()
+    for folder, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
+        deck, stored = forward.read_deck, f"{folder}/{MODEL}"
+        of_model = {name: deck.root / name for name in deck.files} | extra_files(deck, forward.also, Path())
+        copies.files |= {f"{stored}/{name}": file for name, file in of_model.items()}
+        models.append(f"{stored}/{deck.main}")
+        also = [stored_place(deck, Path(file)) for file in forward.also]
+        also_copies += [file if Path(file).is_absolute() else f"{folder}/{file}" for file in also]
+    relocated |= {"models": tuple(models), "also": list(dict.fromkeys(also_copies))}
+    for setting in ("quantities", "along"):
+        texts = getattr(settings, setting)
+        relocated[setting] = {name: copies.of_code(located(text, beside)) for name, text in texts.items()}
+    return copies, relocated
 
 
 def _folders(count: int) -> list[str]:
@@ -163,30 +164,6 @@ def _decks(study: CalibrationStudy) -> list[tuple[tuple[str, ...], DeckForward]]
         return [(tuple(study.data), study.forward)]
     models = study.forward.models if isinstance(study.forward, SeveralModels) else ()
     return [(names, model) for names, model in models if isinstance(model, DeckForward)]
-
-
-def _model_copies(
-    decks: list[tuple[tuple[str, ...], DeckForward]], settings: CalibrationSettings, beside: Path
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the files of finite-element models and of functions, and the settings that name their copies."""
-    copies, models, also_copies = dict[str, Any](), list[str](), list[str]()
-    for folder, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
-        deck, stored = forward.read_deck, f"{folder}/{MODEL}"
-        copies |= {f"{stored}/{name}": deck.root / name for name in deck.files}
-        copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
-        models.append(f"{stored}/{deck.main}")
-        also = [stored_place(deck, Path(file)) for file in forward.also]
-        also_copies += [file if Path(file).is_absolute() else f"{folder}/{file}" for file in also]
-    relocated: dict[str, Any] = {"models": tuple(models), "also": list(dict.fromkeys(also_copies))}
-    for setting in ("quantities", "along"):
-        texts = dict(getattr(settings, setting))
-        for name, text in texts.items():
-            if match := LAW.fullmatch(located(text, beside)):
-                file = Path(match["path"])
-                copies[f"{INPUT}/{file.name}"] = file
-                texts[name] = f"{INPUT}/{file.name}:{match['name']}"
-        relocated[setting] = texts
-    return copies, relocated
 
 
 def _tables(study: CalibrationStudy) -> dict[str, Any]:
@@ -220,34 +197,25 @@ def _tables(study: CalibrationStudy) -> dict[str, Any]:
     }
 
 
-WORST_RUNS = 8
-"""Rows of the page's table of runs that were left out."""
-
-
-def _worst_runs(calibration: Calibration) -> list[list[str]]:
-    """Return the worst rows of `Calibration.leave_one_out` as text."""
-    return [
-        [*(f"{value:.4g}" for value in row[:-3]), f"{row[-3]:.2g}", f"{row[-2]:.2g}", f"{row[-1]:.1f}"]
-        for row in calibration.leave_one_out.to_numpy()[:WORST_RUNS]
-    ]
-
-
 def _rows(columns: dict[str, Any]) -> list[Row]:
     """Return columns as rows; nothing for nan."""
     lists = [[None if np.isnan(value) else float(value) for value in column] for column in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
-def readable_calibration(study: CalibrationStudy) -> list[list[str]]:
-    """Return the rows of the summary as text, under `HEADERS`, in the units of the forward model."""
+def _parameters(study: CalibrationStudy) -> Table:
+    """Return the parameters in the units of the forward model."""
     calibration, rows = study.calibration, []
     for symbol, marginal in calibration.marginals.items():
-        low, high = marginal.hdi()
         mean, sd = (interval(number, number, marginal.sd)[0] for number in (marginal.mean, marginal.sd))
-        ends = "[{}, {}]".format(*interval(low, high, marginal.sd))
-        ess, share = calibration.posterior.ess[symbol], calibration.emulator_share[symbol]
-        rows.append([study.label(symbol), mean, sd, ends, f"{ess:.0f}", f"{100 * share:.0f} %"])
-    return rows
+        ends = "[{}, {}]".format(*interval(*marginal.hdi(), marginal.sd))
+        share = calibration.emulator_share[symbol]
+        rows.append(
+            [study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{100 * share:.0f} %"]
+        )
+    headers = ["parameter", "mean", "sd", "95 % interval", "ESS", "by emulator"]
+    note = f"{BY_EMULATOR} Emulator, {calibration.check}."
+    return Table(headers, rows, f"{study.forward.name}: {len(calibration.runs)} runs", note=note)
 
 
 def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
@@ -288,6 +256,10 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
         f"The emulator's error is at most {calibration.error_ratio:.2g} of noise and discrepancy (variances, in the "
         "worst direction of the data, mean over the posterior).",
     )
+    worst = [
+        [*(f"{value:.4g}" for value in point), f"{error:.2g}", f"{sd:.2g}", f"{standardised:.1f}"]
+        for *point, error, sd, standardised in calibration.leave_one_out.to_numpy()[:WORST_RUNS]
+    ]
     sensitivity = [
         [str(symbol), f"{100 * first_order:.0f} %", f"{100 * total:.0f} %"]
         for symbol, first_order, total in calibration.sensitivity.itertuples()
@@ -295,7 +267,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     sections = [
         Section("Posteriors and predictive checks", (band, coverage, marginals)),
         Section("The emulator", (EMULATOR, checks, errors, WORST,
-                Table([*labels, "error", "sd", "standardised"], _worst_runs(calibration)))),
+                Table([*labels, "error", "sd", "standardised"], worst))),
         Section("What the outputs depend on", (SOBOL, Table(["parameter", "first", "total"], sensitivity))),
     ]  # fmt: skip
     if runs.failure_summary:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
@@ -19,26 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "EXPLANATIONS",
-    "HEADERS",
-    "comparison_figure",
-    "comparison_result",
-    "comparison_warnings",
-    "parameter_header",
-    "readable_comparison",
-]
+__all__ = ["EXPLANATIONS", "comparison_figure", "comparison_result", "comparison_table", "comparison_warnings"]
 
-HEADERS = [
-    "fit",
-    "log evidence",
-    "log Bayes factor",
-    "with other priors",
-    "probability",
-    "elpd difference",
-    "stacking",
-]
-"""Of `readable_comparison`; the last is the parameter."""
 EXPLANATIONS = (
     "Log Bayes factor: log evidence relative to the best fit. With other priors: its range when the prior scales of "
     "the discrepancies are divided or multiplied by four and the uniform priors of linear parameters are four times as "
@@ -53,24 +36,31 @@ MAX_DRAWN_DIFFERENCE = 25.0
 """Difference of a log density beyond which a point is drawn at the edge, with its number."""
 
 
-def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]]:
-    """Return the rows of a comparison as text, under `HEADERS` and the parameter in the given unit."""
-    readable = []
-    for name, row in table.iterrows():
-        ends = row["log_bayes_factor_low"], row["log_bayes_factor_high"]
-        readable.append(
-            [
-                str(name),
-                _text(row["log_evidence"], ".2f"),
-                _text(row["log_bayes_factor"], ".2f"),
-                "" if isnan(ends[0]) else f"{ends[0]:.1f} to {ends[1]:.1f}",
-                _percent(row["probability"]),
-                f"{0.0 - row['elpd_difference']:.1f} ± {row['elpd_difference_error']:.1f}",
-                f"{row['stacking']:.2f}{' (rough)' if row['is_rough'] else ''}",
-                _interval(row, unit),
-            ]
-        )
-    return readable
+def comparison_table(table: pd.DataFrame, unit: StressUnit) -> Table:
+    """Return a comparison as text, the parameter in the given unit; its name where all fits have the same one."""
+
+    def text(name: str, form: str) -> Callable[[Any], str]:
+        return lambda row: "" if isnan(row[name]) else format(row[name], form)
+
+    def of_other_priors(row: Any) -> str:
+        low, high = row["log_bayes_factor_low"], row["log_bayes_factor_high"]
+        return "" if isnan(low) else f"{low:.1f} to {high:.1f}"
+
+    def of_parameter(row: Any) -> str:
+        low, high = (float(row[name]) / unit.to_mpa for name in ("hdi_low", "hdi_high"))
+        return "" if isnan(row["median"]) else " to ".join(interval(low, high, (high - low) / 4))
+
+    columns: dict[str, Callable[[Any], str]] = {
+        "fit": lambda row: str(row.name),
+        "log evidence": text("log_evidence", ".2f"),
+        "log Bayes factor": text("log_bayes_factor", ".2f"),
+        "with other priors": of_other_priors,
+        "probability": lambda row: "" if isnan(row["probability"]) else f"{100 * row['probability']:.1f} %",
+        "elpd difference": lambda row: f"{0.0 - row['elpd_difference']:.1f} ± {row['elpd_difference_error']:.1f}",
+        "stacking": lambda row: f"{row['stacking']:.2f}{' (rough)' * bool(row['is_rough'])}",
+        f"{' or '.join(table['parameter'].dropna().unique())}, {unit.name} (95 %)": of_parameter,
+    }
+    return Table.of((row for _, row in table.iterrows()), columns, "Fits of the same measurements")
 
 
 def comparison_warnings(table: pd.DataFrame) -> list[str]:
@@ -162,10 +152,7 @@ def comparison_result(table: pd.DataFrame, runs: list[str], unit: StressUnit) ->
         next_step="before you take one of these numbers, read in its own report what its discrepancy does to the "
         "initial stiffness.",
         picture=answer,
-        tables=(
-            Table([*HEADERS, parameter_header(table, unit)], readable_comparison(table, unit),
-                  "Fits of the same measurements"),
-        ),
+        tables=(comparison_table(table, unit),),
         sections=(Section("Evidence, prediction and parameter", (figure,)),
                   Section("How to read it", ((*EXPLANATIONS, excluding),))),
         warnings=tuple(comparison_warnings(table)),
@@ -198,26 +185,6 @@ def _parameter_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
         axis = figure.subplots()
         _intervals(axis, rows(axis, [str(name) for name in table.index]), table, unit)
     return figure
-
-
-def parameter_header(table: pd.DataFrame, unit: StressUnit) -> str:
-    """Return the heading of the parameter's column: its name where all fits have the same one."""
-    return f"{' or '.join(table['parameter'].dropna().unique())}, {unit.name} (95 %)"
-
-
-def _text(value: float, form: str) -> str:
-    return "" if isnan(value) else format(value, form)
-
-
-def _percent(share: float) -> str:
-    return "" if isnan(share) else f"{100 * share:.1f} %"
-
-
-def _interval(row: pd.Series[Any], unit: StressUnit) -> str:
-    if isnan(row["median"]):
-        return ""
-    low, high = (float(row[name]) / unit.to_mpa for name in ("hdi_low", "hdi_high"))
-    return " to ".join(interval(low, high, (high - low) / 4))
 
 
 def _differences(axis: Axes, levels: Any, middle: pd.Series[float], low: Any, high: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from tissuq.report.coverage_figures import coverage_figure, family_figure, shares_figure, unseen_figure
@@ -12,9 +13,7 @@ from tissuq.validation.coverage import CoverageSettings, summarise, summarise_un
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["coverage_result", "numbers_of_shares", "readable_coverage"]
-
-Rows = tuple[list[str], list[list[str]]]
+__all__ = ["coverage_result", "coverage_table", "numbers_of_shares"]
 
 MIN_RELATIVE_ERROR = 1e-9
 """Monte Carlo error, relative to its number, below which it is rounding and shown as zero."""
@@ -25,6 +24,22 @@ SETTING_HEADERS = {
     "family": "family",
     "mode": "loading mode",
 }
+OF_COVERAGE = {
+    "fits": ("fits", "count"),
+    "coverage": ("coverage", "percent"),
+    "score": ("score / C10", "number"),
+    "price": ("score / oracle", "number"),
+    "price_median": ("(median)", "plain"),
+    "width": ("width / oracle", "number"),
+    "bias": ("bias", "percent"),
+    "predictive": ("new data in band", "percent"),
+}
+OF_UNSEEN = {
+    "materials": ("materials", "count"),
+    "coverage": ("true stress in band", "percent"),
+    "error": ("error of the mean", "percent"),
+}
+"""Heads of the columns of a summary, and what stands in each."""
 MODES = (
     "The true stress against the {percent} % band of the stress itself, at stretches above one up to where I1 or I2 "
     "leaves the range that was measured. The error is the median over materials of the root mean square error of the "
@@ -42,7 +57,6 @@ def coverage_result(settings: CoverageSettings, results: list[dict[str, Any]]) -
     if settings.unseen:
         tables["unseen"] = summarise_unseen(settings, results)
     percent = f"{100 * settings.prob:g}"
-    headers, rows = readable_coverage(summary)
     families_word = "families or materials" if len(settings.families) > 1 else "family or material"
     designs = f"{len(settings.designs)} designs" if len(settings.designs) > 1 else f"design {settings.designs[0].label}"
     scale = f", C10 from {settings.scale[0]:g} to {settings.scale[1]:g} MPa" if settings.scale else ""
@@ -61,15 +75,10 @@ def coverage_result(settings: CoverageSettings, results: list[dict[str, Any]]) -
             "answer", lambda: shares_figure(summary, "coverage", 100 * settings.prob, holding),
             "Coverage of every formulation", "Coverage, a mark for each design, strength and noise."
         ),
-        tables=(Table(headers, rows, "Coverage of C10", _words(headers), ERRORS),),
+        tables=(coverage_table(summary, title="Coverage of C10", note=ERRORS),),
         sections=_sections(settings, tables, percent),
         files={f"{name}.csv": table for name, table in tables.items()},
     )  # fmt: skip
-
-
-def _words(headers: list[str]) -> tuple[int, ...]:
-    """Return the columns up to the formulation, which are no numbers."""
-    return tuple(range(1, headers.index("formulation") + 1))
 
 
 def numbers_of_shares(table: pd.DataFrame, column: str, prob: float, words: str) -> tuple[Number, ...]:
@@ -102,8 +111,7 @@ def _sections(settings: CoverageSettings, tables: dict[str, pd.DataFrame], perce
             "Coverage and error in unseen loading modes",
             f"Coverage and error of the stress in other loading modes. {BARS}.",
         )
-        headers, rows = _readable_unseen(tables["unseen"])
-        table = Table(headers, rows, text_columns=_words(headers))
+        table = coverage_table(tables["unseen"], OF_UNSEEN)
         words = MODES.format(percent=percent)
         sections.append(Section("Stress in loading modes that were not measured", (words, unseen, table)))
     if tables["families"]["family"].nunique() > 1:
@@ -113,9 +121,7 @@ def _sections(settings: CoverageSettings, tables: dict[str, pd.DataFrame], perce
             "Coverage by family and design",
             "Share of intervals that hold the truth, in percent: white where it is nominal, orange where it is lower.",
         )
-        headers, rows = readable_coverage(tables["families"])
-        table = Table(headers, rows, text_columns=_words(headers))
-        sections.append(Section("By family", (families, table)))
+        sections.append(Section("By family", (families, coverage_table(tables["families"]))))
     failed = int(tables["summary"]["failed"].sum())
     unit = ", in units of C10" if settings.scale else ", MPa"
     reading = [
@@ -136,31 +142,10 @@ def _sections(settings: CoverageSettings, tables: dict[str, pd.DataFrame], perce
     return (*sections, Section("How to read it", how))
 
 
-def readable_coverage(summary: pd.DataFrame) -> Rows:
-    """Return headers and rows of a summary as text, with Monte Carlo errors; columns with one value are left out."""
-    headers = {
-        "fits": ("fits", "count"),
-        "coverage": ("coverage", "percent"),
-        "score": ("score / C10", "number"),
-        "price": ("score / oracle", "number"),
-        "price_median": ("(median)", "plain"),
-        "width": ("width / oracle", "number"),
-        "bias": ("bias", "percent"),
-        "predictive": ("new data in band", "percent"),
-    }
-    return _readable(summary, headers)
-
-
-def _readable_unseen(table: pd.DataFrame) -> Rows:
-    headers = {
-        "materials": ("materials", "count"),
-        "coverage": ("true stress in band", "percent"),
-        "error": ("error of the mean", "percent"),
-    }
-    return _readable(table, headers)
-
-
-def _readable(table: pd.DataFrame, headers: dict[str, tuple[str, str]]) -> Rows:
+def coverage_table(
+    table: pd.DataFrame, headers: Mapping[str, tuple[str, str]] = OF_COVERAGE, title: str = "", note: str = ""
+) -> Table:
+    """Return a summary as text, with Monte Carlo errors; columns with one value are left out."""
     varying = [name for name in SETTING_HEADERS if name in table and table[name].nunique() > 1]
     columns = {
         name: header
@@ -175,7 +160,8 @@ def _readable(table: pd.DataFrame, headers: dict[str, tuple[str, str]]) -> Rows:
         ]
         for row in table.to_dict("records")
     ]
-    return [*(SETTING_HEADERS[name] for name in varying), "formulation", *(text for text, _ in columns.values())], rows
+    heads = [*(SETTING_HEADERS[name] for name in varying), "formulation", *(text for text, _ in columns.values())]
+    return Table(heads, rows, title, tuple(range(1, len(varying) + 1)), note)
 
 
 def _with_error(row: Any, name: str, kind: str) -> str:

@@ -115,14 +115,11 @@ def family_figure(families: pd.DataFrame, prob: float) -> Figure:
         for axis, (title, rows) in zip(axes, panels, strict=False):
             table = rows.pivot_table("coverage", "family", "cell", sort=False, aggfunc="first")
             values = table.reindex(index=names, columns=columns).to_numpy()
-            pieces.heat(axis, _shade(values, prob), 100 * values, columns, names, colors)
+            above = 0.95 + 0.05 * (values - prob) / (1 - prob)  # the nominal coverage is at 0.95
+            shades = np.where(values <= prob, 0.95 * values / prob, above)
+            pieces.heat(axis, shades, 100 * values, columns, names, colors)
             axis.set_title(str(title))
     return figure
-
-
-def _shade(values: Any, prob: float) -> Any:
-    """Return coverage so that the nominal one is at 0.95."""
-    return np.where(values <= prob, 0.95 * values / prob, 0.95 + 0.05 * (values - prob) / (1 - prob))
 
 
 def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:

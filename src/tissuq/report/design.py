@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +13,8 @@ from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_fi
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.candidates import Target
 from tissuq.next_test.ranking import TIED
-from tissuq.report.answer_of_run import said_by
 from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.source_run import said_by
 from tissuq.report.tables import Row, significant
 from tissuq.studies.design import DesignSettings, DesignStudy
 
@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["HEADERS", "design_figure", "design_result", "heading", "readable_design"]
+__all__ = ["design_figure", "design_result", "design_table"]
 
-HEADERS = ["test", "expected sd", "reduction", "note"]
-"""Of `readable_design`."""
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
 MAX_TARGETS = 2
@@ -61,30 +59,26 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
 
-def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
-    """Return the rows of one target as text, under `HEADERS`, in the unit of the data; best first, the others last."""
-    factor, _ = _unit(study, target)
-    rows = []
-    for _, row in _rows_of(study, target).iterrows():
-        is_ranked = not isnan(row["reduction"])
+def design_table(study: DesignStudy, target: Target) -> Table:
+    """Return the tests for one target in the unit of the data, best first, under how uncertain it is now."""
+    (factor, unit), rows = _unit(study, target), _rows_of(study, target)
+
+    def reduction(row: Any) -> str:
         error = f" ± {100 * row['error']:.1f} %" if row["error"] else ""
-        rows.append(
-            [
-                str(row["candidate"]),
-                f"{row['sd_after'] / factor:#.3g}" if is_ranked else "",
-                f"{100 * row['reduction']:.1f} %{error}" if is_ranked else "",
-                str(row["note"]),
-            ]
-        )
-    return rows
+        return "" if isnan(row["reduction"]) else f"{100 * row['reduction']:.1f} %{error}"
 
-
-def heading(study: DesignStudy, target: Target) -> str:
-    """Return what a target is, and how uncertain it is now."""
-    factor, unit = _unit(study, target)
-    sd_now = significant(float(_rows_of(study, target)["sd_now"].iloc[0]) / factor)
+    columns: dict[str, Callable[[Any], str]] = {
+        "test": lambda row: str(row["candidate"]),
+        f"expected sd{', ' * bool(unit)}{unit}": lambda row: (
+            "" if isnan(row["reduction"]) else f"{row['sd_after'] / factor:#.3g}"
+        ),
+        "reduction": reduction,
+        "note": lambda row: str(row["note"]),
+    }
+    sd_now = significant(float(rows["sd_now"].iloc[0]) / factor)
     whose = ", of the tissue" * (study.specimen == "other")
-    return f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
+    title = f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
+    return Table.of((row for _, row in rows.iterrows()), columns, _capitalised(title), text_columns=(0, 3))
 
 
 def design_figure(study: DesignStudy) -> Figure:
@@ -138,11 +132,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
             "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
             "Expected standard deviation after the best tests", "Expected standard deviation after a test; line: now."
         ),
-        tables=tuple(
-            Table([HEADERS[0], f"{HEADERS[1]}{_in(study, target)}", *HEADERS[2:]], readable_design(study, target),
-                  _capitalised(heading(study, target)), (0, 3))
-            for target in study.targets
-        ),
+        tables=tuple(design_table(study, target) for target in study.targets),
         sections=(Section("Every test", (tuple(_sentences(study)), figure)), Section("How to read it", (how_to_read,))),
         warnings=(*said.warnings, *study.warnings),
         files={"design.csv": rows, "design.json": rows},
@@ -169,11 +159,6 @@ def _unit(study: DesignStudy, target: Target) -> tuple[float, str]:
     """Return what one unit of a target's values is in MPa, and the unit's name."""
     has_unit = bool(target.unit(study.posterior.model))
     return (study.unit.to_mpa, study.unit.name) if has_unit else (1.0, "")
-
-
-def _in(study: DesignStudy, target: Target) -> str:
-    unit = _unit(study, target)[1]
-    return f", {unit}" if unit else ""
 
 
 def _ranked(study: DesignStudy, target: Target) -> tuple[pd.DataFrame, pd.DataFrame]:

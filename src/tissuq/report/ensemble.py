@@ -21,31 +21,18 @@ from tissuq.decks.quantity import Component
 from tissuq.decks.solver import CalculiXSolver
 from tissuq.experiments.units import stress_unit
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
-from tissuq.report.answer_of_run import Said, said_by
-from tissuq.report.band_table import (
-    LABELS,
-    band_cells,
-    is_mesh_free,
-    largest_share,
-    last_row,
-    mesh_change,
-    of_sources,
-    percent_of,
-    prefix_of,
-    share_cell,
-    shares_in,
-)
+from tissuq.report.band_table import Bands, percent_of
 from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
-from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
-from tissuq.report.tables import significant
+from tissuq.report.result import MAX_NUMBERS, Block, Picture, Preformatted, Result, Section, Table
+from tissuq.report.source_run import Said, said_by
+from tissuq.report.tables import known_number
 from tissuq.result_warning import merged
 from tissuq.studies.ensemble import DRAWS, EnsembleStudy
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
 
-__all__ = ["copy_functions", "ensemble_result", "readable_quantities"]
+__all__ = ["copy_functions", "ensemble_result"]
 
 FUNCTIONS = "quantities"
 """Folder with copies of the files of the user's functions."""
@@ -88,51 +75,42 @@ def ensemble_result(study: EnsembleStudy, folder: Path, beside: Path = Path()) -
     The relative paths of its settings lie in ``beside``.
     """
     result, prepared = study.result, study.prepared
-    tables = {name: result.table(name) for name in result.curves}
+    bands = {name: Bands(result.table(name), result.is_shared) for name in result.curves}
     stored = [folder / DRAWS / name / FIELDS for name in result.folders]
     fields = [FinalFields.load(path) for path in stored if path.is_file()]
     has_fields = len(fields) > 1 and find_spec("meshio") is not None
     for name in ("fields.vtu", "failures.csv"):
         (folder / name).unlink(missing_ok=True)
     limits = prepared.tasks(folder)[0].limits
-    headers, rows = readable_quantities(study)
     count = len(prepared.ensembles)
     said = {
         name: said_by(beside / run, prepared.ensembles[name].model) for name, run in prepared.settings.materials.items()
     }
-    quantity = next(iter(tables))
+    quantity, of_first = next(iter(bands.items()))
     return Result(
         command="ensemble",
         title="From the posterior into your model",
         subject=f"{prepared.deck.main} with draws of {count} material{'s' * (count > 1)} · {len(result.folders)} of "
         f"{result.draws} draws completed",
-        numbers=_numbers(study, tables),
-        finding=_lead(study, tables),
+        numbers=(
+            *(of_one.number(f"{name} at the end") for name, of_one in list(bands.items())[:MAX_NUMBERS]),
+            *of_first.largest_share(of_first.shares),
+        ),
+        finding=_lead(bands),
         uses=tuple(
             of_run.use._replace(purpose=f"{of_run.use.purpose}, {name}" if count > 1 else of_run.use.purpose)
             for name, of_run in said.items()
             if of_run.use
         ),
         next_step=_next_step(study, said.values(), folder, beside),
-        picture=Picture("answer", lambda: band_over_time(tables[quantity], quantity), f"Band of {quantity} over time",
-                        f"{quantity}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
-        tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
-                      note=f"{_of_sector(study)} {_of_mesh(study, tables)}".strip()),),
-        sections=_sections(study, tables, fields, limits, has_fields=has_fields),
+        picture=Picture("answer", lambda: band_over_time(of_first, quantity), f"Band of {quantity} over time",
+                        f"{quantity}: mean and {of_first.percent} band over draws of the posterior."),
+        tables=(Table(*_at_the_end(bands), f"Model '{prepared.deck.main}' with {result.draws} draws, at the end",
+                      note=f"{_of_sector(study)} {_of_mesh(study, bands)}".strip()),),
+        sections=_sections(study, bands, fields, limits, has_fields=has_fields),
         warnings=(*merged({name: of_run.warnings for name, of_run in said.items()}, named=count > 1), *study.warnings),
-        files=_files(study, tables) | ({"fields.vtu": lambda path: write_fields(path, fields)} if has_fields else {}),
+        files=_files(study, bands) | ({"fields.vtu": lambda path: write_fields(path, fields)} if has_fields else {}),
     )  # fmt: skip
-
-
-def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Number, ...]:
-    """Return every quantity at the end with its band, and the largest share of the variance of the first."""
-    percent, numbers = _headers(study, tables)[4], []
-    for name, table in list(tables.items())[:MAX_NUMBERS]:
-        row = last_row(table)
-        mean, low, high = (row[f"{prefix_of(row)}{column}"] for column in ("mean", "low", "high"))
-        numbers.append(Number(f"{name} at the end", mean, low, high, interval_is=f"{percent} band"))
-    first_table = next(iter(tables.values()))
-    return (*numbers, *largest_share(last_row(first_table), shares_in(first_table, is_shared=study.result.is_shared)))
 
 
 def _next_step(study: EnsembleStudy, said: Iterable[Said], folder: Path, beside: Path) -> str:
@@ -160,20 +138,24 @@ def _next_step(study: EnsembleStudy, said: Iterable[Said], folder: Path, beside:
     return f"see which test would make the band narrower: {design}"
 
 
-def readable_quantities(study: EnsembleStudy) -> tuple[list[str], list[list[str]]]:
+def _at_the_end(bands: dict[str, Bands]) -> tuple[list[str], list[list[str]]]:
     """Return headers and rows of the quantities at the end as text."""
-    result = study.result
-    tables = {name: result.table(name) for name in result.curves}
-    headers = ["quantity", *_headers(study, tables)]
-    return headers, [[name, *_row(study, last_row(table))] for name, table in tables.items()]
+    of_first = next(iter(bands.values()))
+    percent = percent_of(min(of_one.last["draws"] for of_one in bands.values()))
+    headers = ["quantity", *of_first.headers("time", "mean", percent, of_first.shares)]
+    return headers, [[name, *_cells(of_one, of_one.last)] for name, of_one in bands.items()]
 
 
-def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
+def _cells(bands: Bands, row: dict[str, Any]) -> list[str]:
+    return bands.cells(row, f"{row['time']:.4g}", bands.shares)
+
+
+def _files(study: EnsembleStudy, bands: dict[str, Bands]) -> dict[str, Any]:
     """Return tables, curves, cards, summary and the changes of the deck."""
     import pandas as pd
 
     result, prepared = study.result, study.prepared
-    frames = [table.assign(quantity=name) for name, table in tables.items()]
+    frames = [of_one.table.assign(quantity=name) for name, of_one in bands.items()]
     everything = pd.concat(frames, ignore_index=True).drop(columns=["noise", "noise_error"], errors="ignore")
     everything.insert(0, "quantity", everything.pop("quantity"))
     elements_beyond = result.beyond
@@ -189,7 +171,10 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
             "finer_model": _finer(study),
             "draws": result.draws,
             "failed": sum(failure.family == COMPLETE for failure in result.failures),
-            "quantities": {name: _plain(last_row(table)) for name, table in tables.items()},
+            "quantities": {
+                name: {key: known_number(value) for key, value in of_one.last.items() if not key.startswith("noise")}
+                for name, of_one in bands.items()
+            },
             "measured_invariants": {name: list(ensemble.most) for name, ensemble in prepared.ensembles.items()},
             "elements_beyond": None if elements_beyond is None else float(np.nanmean(elements_beyond[1][:, -1])),
             "seconds": result.seconds,
@@ -250,32 +235,13 @@ def _curves(study: EnsembleStudy) -> xr.Dataset:
     return xr.Dataset(curves, coordinates, {"model": study.prepared.settings.model})
 
 
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: None if value != value else float(value) for key, value in row.items() if not key.startswith("noise")}
-
-
-def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]:
-    percent = percent_of(min(table["draws"].iloc[-1] for table in tables.values()))
-    shares = shares_in(next(iter(tables.values())), is_shared=study.result.is_shared)
-    first_table = next(iter(tables.values()))
-    return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)] + (
-        ["on this mesh"] * is_mesh_free(first_table)
-    )
-
-
-def _row(study: EnsembleStudy, row: dict[str, Any]) -> list[str]:
-    cells = [f"{row['time']:.4g}", str(int(row["draws"])), *band_cells(row, prefix=prefix_of(row))]
-    cells += [share_cell(row, name) for name in shares_in(row, is_shared=study.result.is_shared)]
-    return [*cells, *[significant(row["mean"])] * is_mesh_free(row)]
-
-
-def _of_mesh(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
+def _of_mesh(study: EnsembleStudy, bands: dict[str, Bands]) -> str:
     """Return what was done for the size of the elements, in sentences; nothing where nothing was."""
     finer = study.prepared.finer
-    corrected = {name: last_row(table) for name, table in tables.items() if is_mesh_free(table)}
+    corrected = {name: of_one.mesh_change for name, of_one in bands.items() if of_one.is_mesh_free}
     if finer is None or not corrected:
         return ""
-    sizes = ", ".join(f"{name} {mesh_change(row)}" for name, row in corrected.items())
+    sizes = ", ".join(f"{name} {change}" for name, change in corrected.items())
     return (
         f"For elements without size (Richardson): at the end {sizes} beside this mesh, of which a quarter is taken as "
         f"the sd of its error, within the band. {finer.words}"
@@ -284,7 +250,7 @@ def _of_mesh(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
 
 def _sections(
     study: EnsembleStudy,
-    tables: dict[str, pd.DataFrame],
+    bands: dict[str, Bands],
     fields: Sequence[FinalFields],
     limits: tuple[tuple[str, tuple[float, float]], ...],
     *,
@@ -292,11 +258,10 @@ def _sections(
 ) -> tuple[Section, ...]:
     """Return what a page folds: every quantity, states of the material, failures, how it was computed."""
     prepared, result = study.prepared, study.result
-    headers = _headers(study, tables)
-    sections = [Section(f"{name} over time", _quantity(study, name, table, headers)) for name, table in tables.items()]
-    if shares_in(first_table := next(iter(tables.values())), is_shared=result.is_shared):
-        sentences = (*[SHARES] * result.is_shared, *[of_sources(first_table)] * bool(result.sources))
-        sentences += (OF_MESH,) * is_mesh_free(first_table)
+    sections = [Section(f"{name} over time", _quantity(study, name, of_one)) for name, of_one in bands.items()]
+    if (of_first := next(iter(bands.values()))).shares:
+        sentences = (*[SHARES] * result.is_shared, *[of_first.of_sources] * bool(result.sources))
+        sentences += (OF_MESH,) * of_first.is_mesh_free
         sections.append(Section("Sources of uncertainty", sentences))
     materials = [
         [name, ensemble.model.experiment.name, ensemble.model.material.name, ensemble.model.discrepancy.name,
@@ -318,7 +283,7 @@ def _sections(
             for item in result.failures
         )
         sections.append(Section("Draws that failed", failures))
-    is_meshed = bool(_of_mesh(study, tables))
+    is_meshed = bool(_of_mesh(study, bands))
     stored = " `fields.vtu` holds mean and standard deviation of the fields at the end for ParaView." * has_fields
     computed = (
         f"{result.draws} draws of the posterior, the same and in the same order as `tissuq export` writes. Solver: "
@@ -329,30 +294,30 @@ def _sections(
         "the end are its own.",
         f"The error of the model's {'' if is_meshed else 'mesh, of its '}loads and of its supports is in no number "
         f"here.{stored}",
-        *[_of_mesh(study, tables)] * is_meshed,
+        *[_of_mesh(study, bands)] * is_meshed,
     )
     changed = prepared.diff().encode("utf-8", "replace").decode()
     deck = Section("What was changed in the deck, for the first draw", (Preformatted(changed),))
     return (*sections, Section("How it was computed", (computed, deck)))
 
 
-def _quantity(study: EnsembleStudy, name: str, table: pd.DataFrame, headers: list[str]) -> tuple[Block, ...]:
+def _quantity(study: EnsembleStudy, name: str, bands: Bands) -> tuple[Block, ...]:
     """Return definition, figure and some times of a quantity."""
-    full = table[table["draws"] > 1]
-    is_shared = bool(shares_in(table, is_shared=study.result.is_shared))
-    picked = full.iloc[np.unique(np.linspace(0, len(full) - 1, ROWS).round().astype(int))]
-    rows = [_row(study, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")]
+    several, has_shares = bands.of_several, bool(bands.shares)
+    picked = several.iloc[np.unique(np.linspace(0, len(several) - 1, ROWS).round().astype(int))]
+    rows = [_cells(bands, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")]
     quantity = next(quantity for quantity in study.prepared.quantities if quantity.name == name)
     is_function = isinstance(quantity, FunctionQuantity)  # whose file is known by its absolute name
     text = study.prepared.settings.quantities[name] if is_function else quantity.text
-    shares = " Right: shares of the variance, ± one standard error (bootstrap)." * is_shared
+    shares = " Right: shares of the variance, ± one standard error (bootstrap)." * has_shares
     figure = Picture(
         f"quantity-{name}",
-        lambda: quantity_figure(study.result, table, name),
+        lambda: quantity_figure(study.result, bands, name),
         f"Band of {name} over time, and its values at the end",
-        f"Left: mean and {headers[4]} band over draws of the posterior, over the time of the model. "
-        f"{'Middle' if is_shared else 'Right'}: the draws at its end.{shares}",
+        f"Left: mean and {bands.percent} band over draws of the posterior, over the time of the model. "
+        f"{'Middle' if has_shares else 'Right'}: the draws at its end.{shares}",
     )  # fmt: skip
+    headers = bands.headers("time", "mean", bands.percent, bands.shares)
     return f"{text}, in the units of the model", figure, Table(headers, rows)
 
 
@@ -371,12 +336,11 @@ def _of_sector(study: EnsembleStudy) -> str:
     )
 
 
-def _lead(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:
+def _lead(bands: dict[str, Bands]) -> str:
     """Return the finding in a sentence for each quantity."""
-    percent = _headers(study, tables)[4]
     sentences = []
-    for name, table in tables.items():
-        row = last_row(table)
-        mean, _, ends = band_cells(row, prefix=prefix_of(row))
-        sentences.append(f"At time {row['time']:.4g}, {name} is {mean} ({percent}: {ends}).")
+    for name, of_one in bands.items():
+        mean, _, ends = of_one.band(of_one.last)
+        percent = percent_of(of_one.last["draws"])
+        sentences.append(f"At time {of_one.last['time']:.4g}, {name} is {mean} ({percent}: {ends}).")
     return " ".join(sentences)

@@ -14,12 +14,10 @@ from tissuq.decks.fields import FinalFields
 from tissuq.decks.model_ensemble import ModelEnsemble
 from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
-from tissuq.report.band_table import SHARES as ALL_SHARES
-from tissuq.report.band_table import last_row, mesh_ratio, percent_of, prefix_of, shares_in
-from tissuq.report.simulation_figures import draw_shares
+from tissuq.report.band_table import Bands
+from tissuq.report.simulation_figures import draw_shares, moments
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -27,41 +25,38 @@ __all__ = ["band_over_time", "quantity_figure", "state_figure", "write_fields"]
 
 FloatArray = NDArray[np.float64]
 
-SHARES = {name: color for name, color in ALL_SHARES.items() if name != "noise"}
 
-
-def band_over_time(table: pd.DataFrame, name: str) -> Figure:
-    """Return the band of a quantity over time, from its table, for the head of a page."""
+def band_over_time(bands: Bands, name: str) -> Figure:
+    """Return the band of a quantity over time, for the head of a page."""
     with new_figure(ANSWER_WIDTH, 3.6) as figure:
-        _draw_band(figure.subplots(), table[table["draws"] > 1], name)
+        _draw_band(figure.subplots(), bands, name)
     return figure
 
 
-def _draw_band(axis: Axes, table: pd.DataFrame, name: str) -> None:
+def _draw_band(axis: Axes, bands: Bands, name: str) -> None:
     """Draw mean and band of a quantity over time; of a single time as an interval."""
-    time, percent = table["time"], percent_of(table["draws"].max())
+    table = bands.of_several
     is_path = len(table) > 1
-    mean, low, high = (table[f"{prefix_of(table)}{column}"] for column in ("mean", "low", "high"))
-    pieces.band(axis, time, low, high, strength=0.25, label=percent, is_path=is_path)
-    pieces.line(axis, time, mean, label="mean", is_path=is_path)
+    mean, low, high = (table[f"{bands.prefix}{column}"] for column in ("mean", "low", "high"))
+    pieces.band(axis, table["time"], low, high, strength=0.25, label=bands.percent, is_path=is_path)
+    pieces.line(axis, table["time"], mean, label="mean", is_path=is_path)
     axis.set_xlabel("time")
     axis.set_title(name)
     axis.legend(fontsize=9)
 
 
-def quantity_figure(ensemble: ModelEnsemble, table: pd.DataFrame, name: str) -> Figure:
+def quantity_figure(ensemble: ModelEnsemble, bands: Bands, name: str) -> Figure:
     """Draw the band of a quantity over time, the last values, and the shares of the variance where there are any."""
     with new_figure(9.6, 3.7) as figure:
-        has_shares = bool(shares_in(table, is_shared=ensemble.is_shared)) and len(ensemble.times[name]) > 1
+        has_shares = bool(bands.shares) and len(ensemble.times[name]) > 1
         axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
-        table = table[table["draws"] > 1]
-        _draw_band(axes[0], table, name)
-        last = ensemble.last_values(name) * mesh_ratio(last_row(table))
+        _draw_band(axes[0], bands, name)
+        last = ensemble.last_values(name) * bands.mesh_ratio(bands.last)
         axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
         axes[1].set_title(f"{name} at the end")
         axes[1].set_ylabel("draws")
         if has_shares:
-            draw_shares(axes[2], table["time"], table, SHARES)
+            draw_shares(axes[2], "time", bands.of_several.drop(columns="noise", errors="ignore"))
             axes[2].set_xlabel("time")
     return figure
 
@@ -107,14 +102,5 @@ def write_fields(path: Path, fields: Sequence[FinalFields]) -> None:
         cells["I1 - 3"], cells["I2 - 3"] = (np.stack([draw.invariants[:, axis] for draw in fields]) for axis in (0, 1))
     ends = np.cumsum([len(members) for members in first_draw.cells.values()])[:-1]
     blocks = [(CELL_TYPES[kind][0], members) for kind, members in first_draw.cells.items()]
-    of_cells = {name: np.split(values, ends) for name, values in _moments(cells).items()}
-    meshio.Mesh(first_draw.points, blocks, _moments(points), of_cells).write(path, file_format="vtu")
-
-
-def _moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return mean and standard deviation over the first axis, by labels."""
-    moments = {}
-    for name, values in fields.items():
-        moments[f"mean {name}"] = values.mean(axis=0)
-        moments[f"sd of {name}"] = values.std(axis=0, ddof=1)
-    return moments
+    of_cells = {name: np.split(values, ends) for name, values in moments(cells).items()}
+    meshio.Mesh(first_draw.points, blocks, moments(points), of_cells).write(path, file_format="vtu")

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
-from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure, shortened
+from tissuq.drawing.panels import columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BASE, TRUTH, new_figure, save_figure
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
-from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described, described
 from tissuq.pictures.parameters import ridges
 from tissuq.pictures.stability import shade_instability
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "answer_figure",
     "described_curves",
     "marginal_figure",
     "predictive_figure",
@@ -41,17 +39,6 @@ def described_curves(posterior: Posterior) -> list[Described]:
     """Return what a posterior says of its curves; what is inside the bands it knows already."""
     inside = posterior.inside_bands() if posterior.solution.is_of_data else None
     return described(posterior.solution, inside=inside)
-
-
-def answer_figure(
-    posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False, computed: Sequence[Described] | None = None
-) -> Figure:
-    """Return `Posterior.plot` for the head of a page: 1000 x 480 px, or 400 px wide with larger letters.
-
-    Further rows of panels make it taller. Its SVG has these sizes at 96 px an inch; a page embeds both, and shows the
-    narrow one on screens of up to 600 px. What ``computed`` says of the curves is not computed anew.
-    """
-    return answer_on_new_figure(computed or described_curves(posterior), unit, is_narrow=is_narrow)
 
 
 def predictive_figure(
@@ -118,7 +105,10 @@ def predictive_figure(
                 axis.set_xlabel(curve.abscissa_name, fontsize=9)
         if len(curves) == 1:
             shown = [end / unit.to_mpa for of_panel in bands for end in (of_panel.low, of_panel.high)]
-            _share_axes(drawn, columns, limits_of([curves[0].stress / unit.to_mpa, *shown], []))
+            for number, axis in enumerate(drawn.axes):  # numbers beneath the lowest panel of a column alone
+                axis.sharex(drawn.axes[0]) if number else None
+                axis.set_ylim(limits_of([curves[0].stress / unit.to_mpa, *shown], []))
+                axis.tick_params(labelbottom=number + columns >= len(drawn.axes))
             figure.supxlabel(curves[0].abscissa_name, fontsize=10.5)
         measured = {stress for curve in curves for stress in curve.mode.stresses}
         quantity = measured.pop() if len(measured) == 1 else "engineering stress"
@@ -147,11 +137,3 @@ def _label(posteriors: Mapping[str, Posterior], name: str, curve: Curve, letters
     stress = f", {curve.quantity.replace('engineering stress of ', '')}" if len(curve.mode.stresses) > 1 else ""
     words = [name] * (len(posteriors) > 1) + [f"{curve.name}{stress}"]
     return f"{shortened(', '.join(words), letters)}\n"
-
-
-def _share_axes(drawn: Panels, columns: int, limits: tuple[float, float]) -> None:
-    """Give all panels the same limits, and the horizontal axis numbers beneath the lowest panel of a column alone."""
-    for number, axis in enumerate(drawn.axes):
-        axis.sharex(drawn.axes[0]) if number else None
-        axis.set_ylim(limits)
-        axis.tick_params(labelbottom=number + columns >= len(drawn.axes))

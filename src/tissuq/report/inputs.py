@@ -1,4 +1,4 @@
-"""What a fit started from, as files of its run: copies of measured files and laws, and settings that name them."""
+"""Copies of the user's files in the folder of a run, and what a fit started from: settings that name these copies."""
 
 from __future__ import annotations
 
@@ -7,12 +7,41 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tissuq.experiments.experiment import Experiment
-from tissuq.report.run_folder import INPUT, law_files
+from tissuq.mechanics.user_law import LAW
+from tissuq.report.run_folder import INPUT
 from tissuq.studies.laws import LawSettings
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenSettings
 
-__all__ = ["Inputs", "inputs_of"]
+__all__ = ["Copies", "Inputs", "inputs_of"]
+
+
+class Copies:
+    """Copies of the user's files in the folder of a run, so that it can be repeated.
+
+    Attributes
+    ----------
+    files : dict of str to Path
+        By the names of their copies.
+    """
+
+    def __init__(self) -> None:
+        self.files: dict[str, Path] = {}
+
+    def of_file(self, file: Path, folder: str = INPUT, name: str = "") -> str:
+        """Return what the copy of a file is called, by its name there unless another is given."""
+        copy = f"{folder}/{name or file.name}"
+        self.files[copy] = file
+        return copy
+
+    def of_code(self, text: str) -> str:
+        """Return a text that names code in a file, such as ``model.py:force``, with its copy; any other as it is."""
+        match = LAW.fullmatch(text)
+        return f"{self.of_file(Path(match['path'].strip()))}:{match['name']}" if match else text
+
+    def of_law(self, material: str) -> str:
+        """Return the name of a material, or of a sum, with the copies of the laws in the user's files."""
+        return "+".join(map(self.of_code, material.split("+")))
 
 
 class Inputs(NamedTuple):
@@ -26,25 +55,20 @@ class Inputs(NamedTuple):
 
 def inputs_of(settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path]) -> Inputs:
     """Return what a fit started from; ``sources`` are the files that were read, one a test."""
-    several_laws = isinstance(settings, LawSettings)
+    copies, several_laws = Copies(), isinstance(settings, LawSettings)
     named = list(settings.laws) if isinstance(settings, LawSettings) else [settings.material]
-    laws = [law_files(name) for name in named]
-    names = [name for name, _ in laws]
-    files = list(dict.fromkeys(sources))
+    names, files = list(map(copies.of_law, named)), list(dict.fromkeys(sources))
     stems = [file.name for file in files]
     copy_of = {
-        file: f"{INPUT}/{number}-{file.name}" if stems.count(file.name) > 1 else f"{INPUT}/{file.name}"
+        file: copies.of_file(file, name=f"{number}-{file.name}" if stems.count(file.name) > 1 else "")
         for number, file in enumerate(files, 1)
     }
     relocated = _relocated(settings, experiment, sources, copy_of)
     relocated |= {"laws": tuple(names)} if several_laws else {"material": names[0]}
     without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
-    copies = {copy: file for file, copy in copy_of.items()} | {
-        copy: law for _, law_copies in laws for copy, law in law_copies.items()
-    }
     options = "".join(f" --material {name}" for name in names) if names != named else ""
     recipe = settings.model_copy(update=relocated)
-    return Inputs(copies, recipe, without | {"material"} if several_laws else without, options)
+    return Inputs(copies.files, recipe, without | {"material"} if several_laws else without, options)
 
 
 def _relocated(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,18 +12,19 @@ from tissuq.assessment.uses import MIN_STABLE
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import columns_of, legend_above, on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
+from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import points_along, ways_of
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.tables import in_unit_of, known_number, significant, with_named_units
+from tissuq.report.tables import known_number, significant, table_files
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.laws import LawStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["HEADERS", "law_lead", "law_result", "readable_laws"]
+__all__ = ["columns_of_laws", "law_lead", "law_result", "law_table"]
 
 MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
@@ -44,10 +45,6 @@ HOW_TO_READ = (
     "these, with the discrepancy where it is an energy; in the least stable loading mode.",
     "To continue with one law: tissuq predict, export or design with this folder and --material LAW.",
 )
-HEADERS = [
-    "law", "modulus", "95 % interval", "parameters", "probability", "elpd minus best", "R2 alone", "error alone",
-    "share of discrepancy", "stable / 50 % beyond",
-]  # fmt: skip
 
 
 def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
@@ -57,30 +54,25 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         {"law": name} | {str(column): known_number(value) for column, value in row.items()}
         for name, row in comparison.table_in("MPa").iterrows()
     ]
-    inputs = inputs_of(settings, study.experiment, sources)
-    files = {
-        "laws.csv": with_named_units(rows, MODULUS, unit),
-        "laws.json": in_unit_of(rows, MODULUS, unit),
-    }
+    inputs, files = inputs_of(settings, study.experiment, sources), table_files("laws", rows, MODULUS, unit)
     discrepancy = settings.discrepancies[0]
     caption = (
         f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % interval, and the "
         "average by the laws' probabilities."
     )
-    law = study.recommended
+    law, names = study.recommended, list(comparison.fits)
+    laws = " and ".join([", ".join(names[:-1]), names[-1]])
     answer = comparison.fits[law].answer_with(study.data_warnings)
-    headers = [HEADERS[0], f"modulus [{unit.name}]", *HEADERS[2:]]
     return Result(
         command=f"fit{inputs.options}",
-        title=f"{named(study.experiment)}: which law of {_laws_in_words(list(study.comparison.fits))}",
+        title=f"{named(study.experiment)}: which law of {laws if len(names) <= FEW_LAWS else len(names)}",
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
         uses=tuple(use._replace(purpose=f"{use.purpose}, with {law}") for use in answer.uses),
         next_step=f"continue with {law}, which is as good as any here: {_next_step_with(law, answer)}",
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
-        tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",
-                      note="Log evidences, intervals of the shares and times are in `laws.csv`."),),
+        tables=(law_table(study),),
         sections=_sections(study),
         warnings=tuple(study.warnings),
         files=inputs.files | data_file(study.experiment, unit) | files | posterior_files(comparison.fits),
@@ -95,10 +87,6 @@ def _next_step_with(law: str, answer: Answer) -> str:
     if "{run}" not in step.shell:
         return f"{step.shell} Its posterior: tissuq predict {{run}} --material {law} (export and design, too)"
     return step.shell.replace("{run}", f"{{run}} --material {law}")
-
-
-def _laws_in_words(names: list[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) <= FEW_LAWS else f"{len(names)}"
 
 
 def _numbers(study: LawStudy) -> tuple[Number, ...]:
@@ -121,26 +109,40 @@ def _numbers(study: LawStudy) -> tuple[Number, ...]:
     return (*numbers, Number("best for left-out measurements", best, remark=as_good + but))
 
 
-def readable_laws(study: LawStudy) -> list[list[str]]:
-    """Return the rows of the table in words, under `HEADERS`; the moduli in the unit of the file."""
-    return [_readable(str(name), row, study.unit.to_mpa) for name, row in study.comparison.table_in("MPa").iterrows()]
+def columns_of_laws(unit: StressUnit) -> dict[str, Callable[[Any], str]]:
+    """Return how cells are made of a row of `LawComparison.table_in` in MPa; the modulus in a unit."""
+
+    def modulus(row: Any) -> str:
+        return "[{}, {}]".format(*(significant(end / unit.to_mpa) for end in (row.modulus_low, row.modulus_high)))
+
+    def difference(row: Any) -> str:
+        words = f"{0.0 - row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
+        return words if row.elpd_difference else "best"
+
+    def stability(row: Any) -> str:
+        return f"{_percent(row.stable)} / {_percent(row.stable_beyond)}" if row.stable == row.stable else ""
+
+    return {
+        "law": lambda row: str(row.name),
+        f"modulus [{unit.name}]": lambda row: significant(row.modulus / unit.to_mpa),
+        "95 % interval": modulus,
+        "parameters": lambda row: f"{row.parameters:.0f}",
+        "probability": lambda row: _percent(row.probability),
+        "elpd minus best": difference,
+        "R2 alone": lambda row: "" if row.r_squared != row.r_squared else f"{row.r_squared:.4f}",
+        "error alone": lambda row: _percent(row.nrmse),
+        "share of discrepancy": lambda row: "> 100 %" if row.discrepancy_share > 1 else _percent(row.discrepancy_share),
+        "stable / 50 % beyond": stability,
+    }
 
 
-def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
-    mean, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
-    difference = f"{0.0 - row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
-    return [
-        name,
-        mean,
-        f"[{low}, {high}]",
-        f"{row.parameters:.0f}",
-        _percent(row.probability),
-        difference if row.elpd_difference else "best",
-        "" if row.r_squared != row.r_squared else f"{row.r_squared:.4f}",
-        _percent(row.nrmse),
-        "> 100 %" if row.discrepancy_share > 1 else _percent(row.discrepancy_share),
-        f"{_percent(row.stable)} / {_percent(row.stable_beyond)}" if row.stable == row.stable else "",
-    ]
+def law_table(study: LawStudy) -> Table:
+    """Return the laws beside one another as text, the moduli in the unit of the file."""
+    rows = (row for _, row in study.comparison.table_in("MPa").iterrows())
+    return Table.of(
+        rows, columns_of_laws(study.unit), f"Laws of {study.experiment.name}, moduli in {study.unit.name}",
+        note="Log evidences, intervals of the shares and times are in `laws.csv`.",
+    )  # fmt: skip
 
 
 def law_lead(study: LawStudy) -> str:

@@ -1,29 +1,25 @@
-"""What was measured, what the intervals of fits include, and how they were computed, in words."""
+"""What was measured, what intervals include, and how fits were computed, in words: for pages, and for a paper."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.units import StressUnit
 from tissuq.report.result import Block, Section
+from tissuq.report.summary import parameter_rows
+from tissuq.report.tables import interval
 
 if TYPE_CHECKING:
+    from tissuq.model.statistical_model import StatisticalModel
     from tissuq.model.tolerances import Tolerances
     from tissuq.posterior.posterior import Posterior
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = [
-    "computed_section",
-    "data_section",
-    "errors_in_words",
-    "named",
-    "noise_in_words",
-    "subject_of",
-    "tests_in_words",
-]
+__all__ = ["computed_section", "data_section", "methods_section", "named", "subject_of"]
 
 LONGEST_NAME = 40
 """Letters of the names of several tests in a title; of more these are counted."""
@@ -33,6 +29,19 @@ PRIORS = (
     "energies are half-Cauchy, with the typical C10 of the data as their scale; such a posterior may have no mean or "
     "sd, so none is given."
 )
+INTRODUCTION = (
+    "The material model {material}, with the strain-energy density W = {formula} ({source}), was fitted by Bayesian "
+    "inference with tissuq {version} to {count}: {tests}."
+)
+INTERVALS = "Posterior means, with 95 % highest-density intervals of {meaning}: {numbers}."
+WHOLE_TESTS = "Errors of whole tests were included with these standard deviations: {sizes}."
+NO_DISCREPANCY = "The measured stress was taken as the sum of the material's stress and noise: the material is right."
+DISCREPANCY = "The measured stress was taken as the sum of the material's stress, a discrepancy and noise. "
+ENERGY = (
+    "The discrepancy is the stress of a further free energy of the invariants without initial stiffness, before the "
+    "data a Gaussian process of zero mean ('{name}' of tissuq), averaged over its forms by their evidence."
+)
+OTHER_FORM = "The discrepancy is {formula} ('{name}' of tissuq; {source})."
 
 
 def named(experiment: Experiment) -> str:
@@ -50,16 +59,14 @@ def subject_of(experiment: Experiment) -> str:
 
 
 def tests_in_words(experiment: Experiment) -> list[str]:
-    """Return every test in a few words."""
-    return [_test_line(test) for test in experiment.tests]
-
-
-def _test_line(test: Experiment) -> str:
-    """Return a test in a few words: its mode, measurements and range."""
-    control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
-    specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
-    ends = f"{values.min():.4g} to {values.max():.4g}"
-    return f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}"
+    """Return every test in a few words: its mode, measurements and range."""
+    texts = []
+    for test in experiment.tests:
+        control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
+        specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
+        ends = f"{values.min():.4g} to {values.max():.4g}"
+        texts.append(f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}")
+    return texts
 
 
 def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Section:
@@ -116,3 +123,47 @@ def _method_of(posterior: Posterior) -> str:
     text = f"method {posterior.method}. {posterior.how}."
     text += "" if error is None else f" Error of the log evidence: {error:.0e}."
     return text if diagnostics is None else f"{text} {diagnostics.verdict}"
+
+
+def methods_section(study: SpecimenStudy) -> Section:
+    """Return the text, of the discrepancy that answers: model, data, errors, priors, computation and result."""
+    posterior, unit, tests = study.posteriors[study.main], study.unit, study.experiment.tests
+    material, diagnostics = posterior.model.material, posterior.diagnostics
+    introduction = INTRODUCTION.format(
+        material=material.name,
+        formula=material.formula,
+        source=material.source,
+        version=version("tissuq"),
+        count="a test" if len(tests) == 1 else f"{len(tests)} tests",
+        tests="; ".join(tests_in_words(study.experiment)),
+    )
+    priors = ", ".join(
+        f"{row['parameter']} {row['prior']}{' ' * bool(row['unit'])}{row['unit']}"
+        for row in parameter_rows({study.main: posterior})
+    )
+    sizes = errors_in_words(posterior.model.tolerances, unit)
+    numbers = []
+    for name, *values in study.answer.estimates:
+        mean, low, high = (value / unit.to_mpa for value in values)
+        sd = (high - low) / 4
+        numbers.append(f"{name} {interval(mean, mean, sd)[0]} ({' to '.join(interval(low, high, sd))}) {unit.name}")
+    sentences = (
+        introduction,
+        _discrepancy_in_words(posterior.model, study.main),
+        f"Noise: {noise_in_words(study, posterior)}.",
+        WHOLE_TESTS.format(sizes=sizes) if sizes else "",
+        f"Priors: {priors}.",
+        f"Computation: {posterior.how}.",
+        "" if diagnostics is None else diagnostics.verdict,
+        INTERVALS.format(meaning=posterior.model.meaning, numbers=", ".join(numbers)),
+    )
+    return Section("Text for the methods section of a paper", (" ".join(filter(None, sentences)),))
+
+
+def _discrepancy_in_words(model: StatisticalModel, name: str) -> str:
+    discrepancy = model.discrepancy
+    if not discrepancy.parameters:
+        return NO_DISCREPANCY
+    if model.energy_symbols:
+        return DISCREPANCY + ENERGY.format(name=name)
+    return DISCREPANCY + OTHER_FORM.format(name=name, formula=discrepancy.formula, source=discrepancy.source)

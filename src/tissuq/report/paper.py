@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from tissuq.drawing.style import ANSWER_WIDTH
@@ -57,7 +59,16 @@ NOTE = (
     "included: wider boxes lower it. {nuts}With the Mooney-Rivlin term the initial shear modulus is 2 (C10 + C01), so "
     "C10 alone is not half the modulus there."
 )
-AGREEMENT = ["formulation", "mean", "sd ratio", "95 % low", "95 % high", "R-hat", "ESS", "converged"]
+AGREEMENT: dict[str, Callable[[Row], str]] = {
+    "formulation": itemgetter("formulation"),
+    "mean": lambda row: f"{row['mean_shift_in_sd']:+.3f}",
+    "sd ratio": lambda row: f"{row['sd_ratio']:.3f}",
+    "95 % low": lambda row: f"{row['hdi_low_shift_in_sd']:+.3f}",
+    "95 % high": lambda row: f"{row['hdi_high_shift_in_sd']:+.3f}",
+    "R-hat": lambda row: f"{row['rhat']:.4f}",
+    "ESS": lambda row: f"{row['ess']:.0f}",
+    "converged": lambda row: "yes" if row["converged"] else "NO",
+}
 
 
 def paper_result(study: PaperStudy) -> Result:
@@ -72,6 +83,8 @@ def paper_result(study: PaperStudy) -> Result:
     files |= {"sensitivity.csv": [vars(cell) for cell in study.cells], "claims.csv": _claims(study)}
     held = [row["formulation"] for row in summary if row["contains_truth"]]
     passed = [name for name, fit in study.main.items() if fit.finding.passes]
+    table = summary_table(summary, MPA, "The study of the paper: neo-Hookean C10 under seven formulations")
+    nuts = "NUTS gives no evidence. " * (settings.sampler == "nuts")
     return Result(
         command="paper",
         title="How much model uncertainty does a soft-tissue parameter need?",
@@ -87,7 +100,7 @@ def paper_result(study: PaperStudy) -> Result:
             "figure7", lambda: marginal_figure(main, "C10", MPA, settings.truth["C10"], ANSWER_WIDTH),
             "Marginal posteriors of C10 for seven formulations", FIGURE_7, is_slim=True,
         ),
-        tables=(_table(study, summary),),
+        tables=(replace(table, note=f"{table.note} {NOTE.format(nuts=nuts)}"),),
         sections=_sections(study),
         warnings=tuple(study.warnings),
         files=files,
@@ -115,12 +128,6 @@ def _numbers(summary: list[Row], held: list[str], passed: list[str]) -> tuple[Nu
     return (*numbers, Number("pass the predictive check", f"{len(passed)} of {count}", remark=remark))
 
 
-def _table(study: PaperStudy, summary: list[Row]) -> Table:
-    table = summary_table(summary, MPA, "The study of the paper: neo-Hookean C10 under seven formulations")
-    nuts = "NUTS gives no evidence. " * (study.settings.sampler == "nuts")
-    return replace(table, note=f"{table.note} {NOTE.format(nuts=nuts)}")
-
-
 def _sections(study: PaperStudy) -> tuple[Section, ...]:
     """Return what a page folds: the question, the paper's figures and claims, ranges, routes, parameters."""
     settings, truth = study.settings, study.settings.truth
@@ -142,8 +149,7 @@ def _sections(study: PaperStudy) -> tuple[Section, ...]:
             "The exact route integrates; NUTS samples the joint density, as the paper does. Distances in units of the "
             "exact posterior sd of C10."
         )
-        rows = [_readable_agreement(row) for row in _agreement(study)]
-        sections.append(Section("Two independent routes", (words, Table(AGREEMENT, rows))))
+        sections.append(Section("Two independent routes", (words, Table.of(_agreement(study), AGREEMENT))))
     times = [[name, f"{fit.seconds:.2f}"] for name, fit in study.main.items()]
     took = Section("How long it took", (Table(["formulation", "seconds"], times),))
     return (*sections, Section("Every parameter", (parameter_table(_posteriors(study.main)),)), took)
@@ -261,16 +267,3 @@ def _cells(study: PaperStudy) -> Table:
             for low, high in ranges
         ],
     )
-
-
-def _readable_agreement(row: Row) -> list[str]:
-    return [
-        row["formulation"],
-        f"{row['mean_shift_in_sd']:+.3f}",
-        f"{row['sd_ratio']:.3f}",
-        f"{row['hdi_low_shift_in_sd']:+.3f}",
-        f"{row['hdi_high_shift_in_sd']:+.3f}",
-        f"{row['rhat']:.4f}",
-        f"{row['ess']:.0f}",
-        "yes" if row["converged"] else "NO",
-    ]

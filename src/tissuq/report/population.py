@@ -17,16 +17,16 @@ from tissuq.population.picture import numbers_of
 from tissuq.population.uses import PREDICTING, uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
+from tissuq.report.inputs import Copies
 from tissuq.report.population_figures import MODULUS, Bands, headline, headline_figure, patient_figure, specimens_figure
 from tissuq.report.population_tables import (
-    copy_of_covariates,
     effects_of_covariates,
     needed_of,
     needed_table_of,
     patient_in_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT, law_files
+from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.result_warning import has_code
@@ -38,10 +38,12 @@ if TYPE_CHECKING:
     from tissuq.model.tolerances import Tolerances
     from tissuq.population import Population
 
-__all__ = ["HEADERS", "population_result", "readable_population"]
+__all__ = ["population_result"]
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""
+COVARIATES = "covariates-of-specimens"
+"""The name of the table of covariates in a run's folder."""
 ENDS = ("hdi_low", "hdi_high")
 NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of specimens."
 SPECIMENS = (
@@ -73,8 +75,6 @@ HOW_TO_READ = (
 )
 POINTS = 81
 """Of the stress of a new specimen."""
-HEADERS = ["parameter", "unit", "quantity", "median", "95 % interval"]
-"""Of `readable_population`."""
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
 QUANTITIES = {
@@ -95,9 +95,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         Where the files of the settings lie, unless they are absolute.
     """
     population, unit, settings = study.population, study.unit, study.settings
-    sources, names = _copies(study, beside)
-    of_covariates, relocated = copy_of_covariates(study, beside)
-    law, laws = law_files(settings.material)
+    copies, relocated = _copies(study, beside)
+    law = relocated["material"]
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
@@ -127,14 +126,14 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
         ),
         tables=(
-            Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), _note(population)),
+            _parameters(study),
             *effects_of_covariates(study),
             *needed_table_of(study, needed),
         ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),
-        files=files | sources | of_covariates | laws | posterior_files({PATIENT: population.patient}),
-        recipe=settings.model_copy(update={"files": names, "material": law, **relocated}),
+        files=files | copies.files | posterior_files({PATIENT: population.patient}),
+        recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 
 
@@ -308,15 +307,19 @@ def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFra
     return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
 
 
-def _copies(study: PopulationStudy, beside: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the user's files, so that the run can be repeated, and what names them there."""
-    copies: dict[str, Any] = {}
-    for name, files in study.settings.sources(beside).items():
+def _copies(study: PopulationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:
+    """Return copies of the user's files, so that the run can be repeated, and the settings that name them."""
+    settings, copies = study.settings, Copies()
+    for name, files in settings.sources(beside).items():
         is_folder = len(files) > 1 or files[0].stem != name
         for file in files:
-            copies[f"{INPUT}/{name}/{file.name}" if is_folder else f"{INPUT}/{file.name}"] = file
-    is_one_file = study.settings.specimen is not None
-    return copies, (f"{INPUT}/{Path(study.settings.files[0]).name}" if is_one_file else INPUT,)
+            copies.of_file(file, f"{INPUT}/{name}" if is_folder else INPUT)
+    sources = INPUT if settings.specimen is None else f"{INPUT}/{Path(settings.files[0]).name}"
+    relocated: dict[str, Any] = {"files": (sources,), "material": copies.of_law(settings.material)}
+    if settings.covariates is not None:
+        table = beside / settings.covariates
+        relocated["covariates"] = copies.of_file(table, name=f"{COVARIATES}{table.suffix}")
+    return copies, relocated
 
 
 def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
@@ -331,21 +334,21 @@ def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
     return scaled
 
 
-def readable_population(study: PopulationStudy) -> list[list[str]]:
-    """Return the rows of the summary as text, under `HEADERS`, in the unit of the files."""
+def _parameters(study: PopulationStudy) -> Table:
+    """Return the parameters of the population in the unit of the files."""
     population, rows = study.population, []
     table = numbers_of(population.summary(unit="MPa"))
     for symbol, is_log in zip(population.symbols, population.coordinates.is_log, strict=True):
         factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
-            is_ratio = quantity == "spread" and is_log
             numbers = table[symbol, quantity]
-            if is_ratio:
-                cells = _text({name: exp(number) for name, number in numbers.items()})
+            if quantity == "spread" and is_log:
+                cells = ["factor", words, *_text({name: exp(number) for name, number in numbers.items()})]
             else:
-                cells = _text(numbers, factor)
-            rows.append([symbol, "factor" if is_ratio else unit, words, *cells])
-    return rows
+                cells = [unit, words, *_text(numbers, factor)]
+            rows.append([symbol, *cells])
+    headers = ["parameter", "unit", "quantity", "median", "95 % interval"]
+    return Table(headers, rows, f"A population of {len(study.tests)} specimens", (1, 2), _note(population))
 
 
 def _readable_specimens(study: PopulationStudy) -> list[list[str]]:

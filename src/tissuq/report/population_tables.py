@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from math import isnan
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tissuq.population.effects import ALL_COVARIATES
 from tissuq.population.sample_size import MAX_SPECIMENS
 from tissuq.report.result import Table
-from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import percent, significant
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["copy_of_covariates", "effects_of_covariates", "needed_of", "needed_table_of", "patient_in_words"]
+__all__ = ["effects_of_covariates", "needed_of", "needed_table_of", "patient_in_words"]
 
 HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % interval", "positive"]
 HEADERS_OF_NUMBERS = ["parameter", "quantity", "now", "with any number", "specimens in all", "more"]
 QUANTITIES = {"median": "median of the population", "new patient": "a new specimen"}
-COPY = "covariates-of-specimens"
-"""The name of the table of covariates in a run's folder."""
 
 
 def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
@@ -58,15 +54,6 @@ def patient_in_words(study: PopulationStudy) -> str:
     """Return what is known of the new specimen, in brackets; nothing without covariates."""
     text = study.population.covariates.described(study.population.patient_covariates)
     return f" ({text})" if text else ""
-
-
-def copy_of_covariates(study: PopulationStudy, beside: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the user's table of covariates as a file of the run, and the setting that names it there."""
-    if study.settings.covariates is None:
-        return {}, {}
-    source = beside / study.settings.covariates
-    target = f"{INPUT}/{COPY}{source.suffix}"
-    return {target: source}, {"covariates": target}
 
 
 def needed_of(study: PopulationStudy) -> pd.DataFrame | None:

@@ -15,35 +15,35 @@ from tissuq.assessment.uses import UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
-from tissuq.report.answer_of_run import uses_of
+from tissuq.report.inputs import Copies
 from tissuq.report.measured import named
 from tissuq.report.prediction_tables import (
-    MAX_ROWS,
-    band_headers,
+    band_table,
     end_words,
     kind_words,
     median_words,
-    readable_bands,
-    readable_scores,
-    score_headers,
+    score_table,
     scored_kind,
     share_words,
 )
-from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT
-from tissuq.report.stability import SAME_STATES
+from tissuq.report.result import Number, Picture, Result, Section
+from tissuq.report.source_run import uses_of
+from tissuq.report.summary import SAME_STATES
+from tissuq.report.tables import table_files
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tissuq.studies.prediction_settings import PredictionSettings
+    from tissuq.studies.run_settings import PredictionSettings
 
 __all__ = ["prediction_figure", "prediction_result"]
 
 FloatArray = NDArray[np.float64]
 
+SCORES = ("crps", "interval_score")
+"""Columns that are stresses."""
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
 
 
@@ -87,19 +87,18 @@ def prediction_result(
     law : str, optional
         The material that was named, where it is a law in the user's file.
     """
+    copies = Copies()
     relocated: dict[str, Any] = {"run": os.path.relpath(beside / settings.run, target), "mode": prediction.mode.name}
     files: dict[str, Any] = {"prediction.csv": prediction.rows, "prediction.nc": prediction.save}
     if settings.data is not None:
-        source = beside / settings.data.file
-        files[f"{INPUT}/{source.name}"] = source
-        copy = {"file": f"{INPUT}/{source.name}", "mode": prediction.mode.name}
+        copy = {"file": copies.of_file(beside / settings.data.file), "mode": prediction.mode.name}
         relocated["data"] = settings.data.model_copy(update=copy)
     if prediction.scores is not None:
         rows = [{str(name): value for name, value in row.items()} for row in prediction.scores.to_dict("records")]
-        unit = prediction.unit.name
-        names = {name: f"{name} [{unit}]" for name in ("crps", "interval_score")}
-        files["scores.csv"] = [{names.get(name, name): row[name] for name in row} for row in rows]
-        files["scores.json"] = [row | {"unit": unit} for row in rows]
+        files |= table_files("scores", rows, SCORES, replace(prediction.unit, to_mpa=1.0))  # they are in it already
+    tables = [band_table(prediction)]
+    if prediction.scores is not None and prediction.data is not None:
+        tables.append(score_table(prediction, prediction.scores, prediction.data.name))
     model = prediction.posterior.model
     measured = " and ".join(f"{test.mode.name} ({len(test)} measurements)" for test in model.experiment.tests)
     run = Path(settings.run).name or settings.run
@@ -108,17 +107,17 @@ def prediction_result(
         title=f"Predicted stress: {prediction.mode.name}, by {model.material.name} fitted to {named(model.experiment)}",
         subject=f"run {run}: {model.material.name}, discrepancy {model.discrepancy.name}, fitted to {measured}",
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
-        finding=_lead(prediction),
+        finding=_lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction),
         uses=_use_of_mode(prediction, beside / settings.run),
         next_step=_next_step(prediction, shlex.quote(os.path.normpath(beside / settings.run))),
         picture=Picture(
             "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
             f"Predicted bands of the stress in mode {prediction.mode.name}", _caption(prediction),
         ),
-        tables=_tables(prediction),
+        tables=tuple(tables),
         sections=_sections(prediction),
         warnings=tuple(prediction.warnings),
-        files=files,
+        files=files | copies.files,
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 
@@ -184,22 +183,6 @@ def _caption(prediction: Prediction) -> str:
     )
 
 
-def _tables(prediction: Prediction) -> tuple[Table, ...]:
-    several, unit = len(prediction.stresses) > 1, prediction.unit.name
-    text_column = (len(prediction.mode.controls),) if several else ()
-    alone_words = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
-    count = len(prediction.points)
-    excerpt = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
-    note = f"{unit}, {', '.join(prediction.stresses)}. {alone_words}{excerpt}".strip()
-    title = f"Stress in mode {prediction.mode.name}, {unit}"
-    tables = [Table(band_headers(prediction), readable_bands(prediction), title, text_column, note)]
-    if prediction.scores is not None and prediction.data is not None:
-        title = f"Measurements of {prediction.data.name}"
-        columns = (1, 2) if several else (1,)
-        tables.append(Table(score_headers(prediction), readable_scores(prediction), title, columns))
-    return tuple(tables)
-
-
 def _sections(prediction: Prediction) -> tuple[Section, ...]:
     """Return what a page folds: all bands as figures, how to read them, the warnings of the fit, the measurements."""
     model, data = prediction.posterior.model, prediction.data
@@ -241,11 +224,6 @@ def _sections(prediction: Prediction) -> tuple[Section, ...]:
         words = f"{data.name}: {len(data)} measurements, {data.source}."
         sections.append(Section("The measurements", (words,)))
     return tuple(sections)
-
-
-def _lead(prediction: Prediction) -> str:
-    """Return the finding in a sentence or two."""
-    return _lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction)
 
 
 def _lead_of_scores(prediction: Prediction) -> str:

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isnan
-from typing import Any
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tissuq.prediction.bands import Band
+from tissuq.report.result import Table
 from tissuq.report.tables import interval, significant
 from tissuq.studies.prediction import Prediction
 
-__all__ = [
-    "MAX_ROWS",
-    "band_headers",
-    "end_words",
-    "kind_words",
-    "median_words",
-    "readable_bands",
-    "readable_scores",
-    "score_headers",
-    "scored_kind",
-    "share_words",
-]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["band_table", "end_words", "kind_words", "median_words", "score_table", "scored_kind", "share_words"]
 
 MAX_ROWS = 13
 """Number of rows of the table of bands on page and terminal; the files have all."""
@@ -31,51 +25,46 @@ MAX_SHARE, MAX_STRESS, MIN_STRESS = 10.0, 1e5, 1e-12
 """Largest share shown as a percentage; stresses (in the unit of the run) shown in powers of ten, and as zero."""
 
 
-def band_headers(prediction: Prediction) -> list[str]:
-    """Return the heads of the columns of `readable_bands`."""
-    stress_column = ["measured"] * (len(prediction.stresses) > 1)
-    names = [control.name for control in prediction.mode.controls]
+def band_table(prediction: Prediction) -> Table:
+    """Return some rows of the bands, from end to end, as text in the unit of the run."""
+    rows, unit, several = [], prediction.unit, len(prediction.stresses) > 1
+    names, count = [control.name for control in prediction.mode.controls], len(prediction.points)
     share = f"{100 * prediction.prob:.4g} %"
     bands = ["median", f"{share} of the stress", f"{share} of measurements"]
     bands_alone = ["alone: median", "alone: stress", "alone: measurements"] if prediction.kinds[0] else []
-    return [*names, *stress_column, *bands, *bands_alone, "calibrated"]
-
-
-def readable_bands(prediction: Prediction) -> list[list[str]]:
-    """Return some rows of the bands, from end to end, as text in the unit of the run."""
-    rows, scale = [], prediction.unit.to_mpa
-    count = len(prediction.points)
     indices = np.unique(np.linspace(0, count - 1, min(count, MAX_ROWS)).round().astype(int))
     for channel, name in enumerate(prediction.stresses):
         for index in indices:
-            cells = [f"{column[index]:.4g}" for column in prediction.controls.values()]
-            cells += [name] * (len(prediction.stresses) > 1)
+            cells = [f"{column[index]:.4g}" for column in prediction.controls.values()] + [name] * several
             for kind in prediction.kinds:
                 stress, noisy = (prediction.curves[channel, kind, noise] for noise in (False, True))
-                cells += [median_words(stress, index, scale), *(end_words(b, index, scale) for b in (stress, noisy))]
+                ends = [end_words(band, index, unit.to_mpa) for band in (stress, noisy)]
+                cells += [median_words(stress, index, unit.to_mpa), *ends]
             rows.append([*cells, "yes" if prediction.is_calibrated[index] else "no"])
-    return rows
+    alone_words = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
+    excerpt = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
+    note = f"{unit.name}, {', '.join(prediction.stresses)}. {alone_words}{excerpt}".strip()
+    headers = [*names, *["measured"] * several, *bands, *bands_alone, "calibrated"]
+    title = f"Stress in mode {prediction.mode.name}, {unit.name}"
+    return Table(headers, rows, title, (len(names),) if several else (), note)
 
 
-def score_headers(prediction: Prediction) -> list[str]:
-    """Return the heads of the columns of `readable_scores`."""
-    stress_column = ["measured"] * (len(prediction.stresses) > 1)
-    unit = prediction.unit.name
-    inside = f"inside {100 * prediction.prob:.4g} %"
-    scores = ["half width", "error", f"CRPS, {unit}", f"interval score, {unit}"]
-    return ["prediction", *stress_column, "range", "points", inside, *scores]
-
-
-def readable_scores(prediction: Prediction) -> list[list[str]]:
-    """Return how the measurements are predicted as text."""
-    rows = []
-    assert prediction.scores is not None  # noqa: S101 (requested only if there are measurements)
-    for row in prediction.scores.to_dict("records"):
-        cells = [scored_kind(prediction, row)] + [row["measured"]] * (len(prediction.stresses) > 1)
-        shares = [share_words(row[name]) for name in ("inside", "half_width", "error")]
-        stresses = [_stress(row[name]) for name in ("crps", "interval_score")]
-        rows.append([*cells, row["range"], f"{row['count']}", *shares, *stresses])
-    return rows
+def score_table(prediction: Prediction, scores: pd.DataFrame, data: str) -> Table:
+    """Return as text how the measurements of that name are predicted."""
+    several, unit = len(prediction.stresses) > 1, prediction.unit.name
+    columns: dict[str, Callable[[Any], str]] = {
+        "prediction": lambda row: scored_kind(prediction, row),
+        **({"measured": itemgetter("measured")} if several else {}),
+        "range": itemgetter("range"),
+        "points": lambda row: f"{row['count']}",
+        f"inside {100 * prediction.prob:.4g} %": lambda row: share_words(row["inside"]),
+        "half width": lambda row: share_words(row["half_width"]),
+        "error": lambda row: share_words(row["error"]),
+        f"CRPS, {unit}": lambda row: _stress(row["crps"]),
+        f"interval score, {unit}": lambda row: _stress(row["interval_score"]),
+    }
+    text_columns = (1, 2) if several else (1,)
+    return Table.of(scores.to_dict("records"), columns, f"Measurements of {data}", text_columns=text_columns)
 
 
 def kind_words(prediction: Prediction, kind: bool) -> str:

@@ -14,10 +14,10 @@ next step, one `Picture`. Then warnings, the tables, and sections that a page fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isnan
-from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypedDict
 
 from tissuq.assessment.uses import Use, Verdict
 from tissuq.report.tables import interval, known_number, significant
@@ -212,6 +212,11 @@ class Table:
     picture: Picture | None = None
 
     kind = "table"
+
+    @classmethod
+    def of(cls, rows: Iterable[Any], columns: Mapping[str, Callable[[Any], str]], title: str = "", **more: Any) -> Self:
+        """Return the table of rows whose cells are made of each by the columns, which are given by their heads."""
+        return cls(list(columns), [[cell(row) for cell in columns.values()] for row in rows], title, **more)
 
     def record(self) -> TableRecord:
         """Return it as it goes into a file."""

@@ -38,7 +38,6 @@ __all__ = [
     "RECIPE",
     "check_apart",
     "check_target",
-    "law_files",
     "run_folder",
     "versions",
     "write_data",
@@ -198,7 +197,10 @@ def write_page(folder: Path, **context: Any) -> None:
     """Write report.html from the template of a result, with the folder's recipe and figures; values are escaped."""
     recipe = folder / RECIPE
     context["recipe"] = recipe.read_text(encoding="utf-8") if recipe.exists() else ""
-    context["figures"] = {path.stem: _as_address(path) for path in sorted((folder / "figures").glob("*.svg"))}
+    figures = sorted((folder / "figures").glob("*.svg"))
+    context["figures"] = {
+        path.stem: f"data:image/svg+xml;base64,{b64encode(path.read_bytes()).decode('ascii')}" for path in figures
+    }
     page = _templates().get_template("result.html").render(versions=versions(), asset=_asset, **context)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
@@ -234,11 +236,6 @@ def _prose(text: str) -> Markup:
 def _asset(name: str) -> str:
     """Return a script or a style that goes into pages."""
     return (files("tissuq.report") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _as_address(figure: Path) -> str:
-    """Return an SVG file as a data address for an image in a page."""
-    return "data:image/svg+xml;base64," + b64encode(figure.read_bytes()).decode("ascii")
 
 
 def versions() -> dict[str, str]:
@@ -284,16 +281,3 @@ def write_recipe(folder: Path, command: str, settings: BaseModel, without: froze
     plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
     header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")
-
-
-def law_files(material: str) -> tuple[str, dict[str, Path]]:
-    """Return the name of a material with the laws in the user's files as their copies are named, and these files."""
-    from tissuq.mechanics.user_law import LAW
-
-    terms, copies = material.split("+"), dict[str, Path]()
-    for index, match in enumerate(map(LAW.fullmatch, terms)):
-        if match:
-            law = Path(match["path"].strip())
-            copies[f"{INPUT}/{law.name}"] = law
-            terms[index] = f"{INPUT}/{law.name}:{match['name']}"
-    return "+".join(terms), copies

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,10 +13,9 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.validation.sbc import SbcSettings, ecdf_band, probabilities_of, summarise_ranks
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["readable_ranks", "sbc_result"]
+__all__ = ["COLUMNS", "sbc_result"]
 
 MAX_COLUMNS = 4
 """Panels in a row of the figure."""
@@ -40,11 +40,23 @@ HOW_TO_READ = (
 )
 
 
+COLUMNS: dict[str, Callable[[Any], str]] = {
+    "formulation": itemgetter("formulation"),
+    "noise": itemgetter("noise"),
+    "parameter": itemgetter("parameter"),
+    "fits": lambda row: str(row["fits"]),
+    "mean": lambda row: f"{row['mean']:.3f}",
+    "spread": lambda row: f"{row['spread']:.3f}",
+    "p (shape)": lambda row: f"{row['p_shape']:.2g}",
+    "p (spread)": lambda row: f"{row['p_spread']:.2g}",
+    "calibrated": lambda row: "yes" if row["calibrated"] else "NO",
+}
+
+
 def sbc_result(settings: SbcSettings, results: list[dict[str, Any]]) -> Result:
     """Return what a simulation-based calibration says."""
     table = summarise_ranks(settings, results)
-    headers, rows = readable_ranks(table)
-    wrong, count = int((~table["calibrated"]).sum()), len(rows)
+    wrong, count = int((~table["calibrated"]).sum()), len(table)
     failed = int(table.groupby(["formulation", "noise"])["failed"].first().sum())
     formulations = f"{len(settings.formulations)} formulation{'s' * (len(settings.formulations) > 1)}"
     finding = (
@@ -74,7 +86,7 @@ def sbc_result(settings: SbcSettings, results: list[dict[str, Any]]) -> Result:
             "answer", lambda: _figure(settings, results, (worst["formulation"], worst["noise"])),
             "ECDF differences of the ranks that are farthest from uniform", CAPTION,
         ),
-        tables=(Table(headers, rows, "Ranks of the truth", (1, 2)),),
+        tables=(Table.of(table.to_dict("records"), COLUMNS, "Ranks of the truth", text_columns=(1, 2)),),
         sections=(
             Section("Every formulation", (all_ranks,)),
             Section("How to read it", (CHECK, (*HOW_TO_READ, *left_out))),
@@ -86,23 +98,6 @@ def sbc_result(settings: SbcSettings, results: list[dict[str, Any]]) -> Result:
 
 def _least_probability(row: Mapping[Any, Any]) -> float:
     return min(float(row["p_shape"]), float(row["p_spread"]))
-
-
-def readable_ranks(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Return headers and rows of the table as text."""
-    rows = [
-        [
-            *(str(row[name]) for name in ("formulation", "noise", "parameter", "fits")),
-            f"{row['mean']:.3f}",
-            f"{row['spread']:.3f}",
-            f"{row['p_shape']:.2g}",
-            f"{row['p_spread']:.2g}",
-            "yes" if row["calibrated"] else "NO",
-        ]
-        for row in table.to_dict("records")
-    ]
-    headers = ["formulation", "noise", "parameter", "fits", "mean", "spread", "p (shape)", "p (spread)", "calibrated"]
-    return headers, rows
 
 
 def _figure(settings: SbcSettings, results: list[dict[str, Any]], only: tuple[str, str] | None = None) -> Figure:

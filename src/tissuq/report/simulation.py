@@ -14,32 +14,18 @@ from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.answer_of_run import Said, said_by
-from tissuq.report.band_table import (
-    LABELS,
-    SHARES,
-    band_cells,
-    handy_unit,
-    is_mesh_free,
-    largest_share,
-    last_row,
-    mesh_change,
-    mesh_ratio,
-    of_sources,
-    percent_of,
-    prefix_of,
-    share_cell,
-    shares_in,
-)
+from tissuq.report.band_table import SHARES, Bands, handy_unit, percent_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.simulation_figures import (
     field_figure,
     force_and_strain_figure,
     force_figure,
+    moments,
     share_figure,
     write_collection,
     write_vtu,
 )
+from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import known_number, significant
 from tissuq.studies.structure import SimulationStudy
 
@@ -47,7 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["readable_forces", "simulation_result"]
+__all__ = ["simulation_result"]
 
 OF_MEASUREMENT = "the variance of a new measurement, whose noise is not in the band"
 MUCH_BEYOND = 0.2
@@ -64,16 +50,12 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
     """Return what a simulation with draws of a run says; its folder holds the results of the draws and the recipe."""
     simulation, model = study.simulation, study.posteriors.fitted.model
     table = simulation.table()
+    unit, factor = handy_unit(table, simulation.case.response_unit)
+    bands = Bands(table, MATERIAL_ONLY in simulation.forces, unit, factor)
     (folder / "failures.csv").unlink(missing_ok=True)
     failures = [vars(failure) for failure in simulation.failures]
     case, said = simulation.case, said_by(run, model)
-    headers, rows = readable_forces(study)
-    percent = percent_of(table["draws"].max())
-    against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
-    caption = (
-        f"{case.response.capitalize()} over {case.travel_name}: mean and {percent} band over draws of the posterior, "
-        f"without the noise of a measurement{against}.{_corrected(table)}"
-    )
+    caption = f"{case.response.capitalize()}{_about_band(simulation, bands)}"
     titled = f"Case '{case.name}' with {study.settings.draws} draws"
     files = {
         f"{case.response}s.csv": table,
@@ -86,13 +68,13 @@ def simulation_result(study: SimulationStudy, folder: Path, run: Path) -> Result
         title=f"From the posterior to a {case.response}",
         subject=f"{case.description} · {model.experiment.name}, {model.material.name}, discrepancy "
         f"{model.discrepancy.name} · {_completed(simulation)}",
-        numbers=_numbers(study, table),
-        finding=_lead(simulation, table),
+        numbers=_numbers(simulation, bands),
+        finding=_lead(simulation, bands),
         uses=(said.use,) if said.use else (),
         next_step=_next_step(simulation, said, shlex.quote(os.path.normpath(run))),
-        picture=Picture("answer", lambda: force_figure(simulation, table), f"Band of the {case.response}", caption),
-        tables=(Table(headers, rows, titled, note=_of_cells(simulation, table)),),
-        sections=_sections(study, table),
+        picture=Picture("answer", lambda: force_figure(simulation, bands), f"Band of the {case.response}", caption),
+        tables=(Table(*_readable(simulation, bands), titled, note=_of_cells(simulation, bands)),),
+        sections=_sections(study, bands),
         warnings=(*said.warnings, *study.warnings),
         files=files | ({"failures.csv": failures} if failures else {}),
     )
@@ -110,32 +92,33 @@ def _completed(simulation: Simulation) -> str:
     return f"{in_full.sum()} of {len(forces)} draws computed in full{failed}, the others to first order"
 
 
-def _corrected(table: pd.DataFrame) -> str:
-    """Return that the size of the cells was corrected, as a sentence after others; nothing where it was not."""
-    return " Corrected for the size of the cells: see the table." if is_mesh_free(table) else ""
+def _about_band(simulation: Simulation, bands: Bands) -> str:
+    """Return what the caption of a figure of the force says after its name."""
+    against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
+    corrected = " Corrected for the size of the cells: see the table." * bands.is_mesh_free
+    return (
+        f" over {simulation.case.travel_name}: mean and {bands.percent} band over draws of the posterior, without the "
+        f"noise of a measurement{against}.{corrected}"
+    )
 
 
-def _of_cells(simulation: Simulation, table: pd.DataFrame) -> str:
+def _of_cells(simulation: Simulation, bands: Bands) -> str:
     """Return how the size of the cells was corrected, in sentences; nothing where it was not."""
-    if not is_mesh_free(table):
+    if not bands.is_mesh_free:
         return ""
     return (
         f"Corrected for the size of the cells, from {simulation.finer_mesh}: at the end by "
-        f"{mesh_change(last_row(table))}, of which a quarter is the sd of the mesh's error in the band (Richardson's "
+        f"{bands.mesh_change}, of which a quarter is the sd of the mesh's error in the band (Richardson's "
         f"extrapolation, the error falling with the power {simulation.mesh_order:g} of the size)."
     )
 
 
-def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
+def _numbers(simulation: Simulation, bands: Bands) -> tuple[Number, ...]:
     """Return the force at the last step, the largest share of its variance, and how much of the body extrapolates."""
-    simulation, last = study.simulation, last_row(table)
-    unit, factor = handy_unit(table, simulation.case.response_unit)
-    mean, low, high = (last[f"{prefix_of(table)}{name}"] * factor for name in ("mean", "low", "high"))
-    case = simulation.case
-    label = f"{case.response} at {case.travel_name} {case.shown(last[case.travel_column])}"
+    case, last = simulation.case, bands.last
     numbers = [
-        Number(label, mean, low, high, unit, f"{percent_of(last['draws'])} band"),
-        *largest_share(last, [name for name in SHARES if name in last], OF_MEASUREMENT),
+        bands.number(f"{case.response} at {case.travel_name} {case.shown(last[case.travel_column])}"),
+        *bands.largest_share([name for name in SHARES if name in last], OF_MEASUREMENT),
     ]
     energy_beyond = _last_mean(simulation.energy_beyond)
     if energy_beyond is not None:
@@ -152,29 +135,13 @@ def _next_step(simulation: Simulation, said: Said, run: str) -> str:
     return f"run your own model with the same draws: tissuq ensemble {run} MODEL --replace NAME --qoi NAME=WHAT"
 
 
-def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]:
+def _readable(simulation: Simulation, bands: Bands) -> tuple[list[str], list[list[str]]]:
     """Return headers and rows of the forces as text."""
-    simulation, table = study.simulation, study.simulation.table()
-    unit, factor = handy_unit(table, simulation.case.response_unit)
-    percent = percent_of(table["draws"].max())
-    is_compared = WITHOUT in simulation.forces
-    shares = [*shares_in(table, is_shared=MATERIAL_ONLY in simulation.forces), "noise"]
-    case = simulation.case
-    headers = [f"{case.travel_name}, {case.travel_unit}", "draws", f"{case.response}, {unit}", "sd", percent]
-    headers += [LABELS[name] for name in shares]
-    headers += ["without discrepancy", percent] * is_compared
-    prefix = prefix_of(table)
-    headers += ["on this mesh"] * bool(prefix)
-    rows = []
-    for row in table.to_dict("records"):
-        numbers = {str(key): value for key, value in row.items()}
-        cells = [f"{row[case.travel_column]:.3g}", str(row["draws"]), *band_cells(numbers, factor, prefix)]
-        cells += [share_cell(numbers, name) for name in shares]
-        if is_compared:
-            mean, _, ends = band_cells(numbers, factor * mesh_ratio(numbers), "without_")
-            cells += [mean, ends]
-        rows.append([*cells, *[significant(numbers["mean"] * factor)] * bool(prefix)])
-    return headers, rows
+    case, shares = simulation.case, [*bands.shares, "noise"]
+    along, mean = f"{case.travel_name}, {case.travel_unit}", f"{case.response}, {bands.unit}"
+    rows = [{str(key): value for key, value in row.items()} for row in bands.table.to_dict("records")]
+    cells = [bands.cells(row, f"{row[case.travel_column]:.3g}", shares) for row in rows]
+    return bands.headers(along, mean, bands.percent, shares), cells
 
 
 def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
@@ -232,15 +199,8 @@ def _write_fields(study: SimulationStudy, folder: Path) -> None:
     simulation = study.simulation
     mesh = simulation.case.mesh()
     if len(simulation.fields.get("first_invariant", ())) > 1:
-        displacement = simulation.fields["displacement"]
-        points = {
-            "mean displacement": displacement.mean(axis=0),
-            "sd of displacement": displacement.std(axis=0, ddof=1),
-        }
-        cells = {}
-        for name, label in CELL_FIELDS.items():
-            cells[f"mean {label}"] = simulation.fields[name].mean(axis=0)
-            cells[f"sd of {label}"] = simulation.fields[name].std(axis=0, ddof=1)
+        points = moments({"displacement": simulation.fields["displacement"]})
+        cells = moments({label: simulation.fields[name] for name, label in CELL_FIELDS.items()})
         write_vtu(folder / "fields.vtu", mesh, points, cells)
     (folder / "steps").mkdir(exist_ok=True)
     files: list[tuple[float, str]] = []
@@ -258,26 +218,22 @@ def _write_fields(study: SimulationStudy, folder: Path) -> None:
     write_collection(folder / "middle_draw.pvd", files)
 
 
-def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...]:
+def _sections(study: SimulationStudy, bands: Bands) -> tuple[Section, ...]:
     """Return what a page folds: strains beyond, sources of uncertainty, fields, failures, how it was computed."""
     simulation, settings = study.simulation, study.settings
-    unit, factor = handy_unit(table, simulation.case.response_unit)
     case, draws = simulation.case, len(simulation.forces[COMPLETE])
-    noise = f"{significant(simulation.noise_sd * factor)} {unit}"
+    noise = f"{significant(simulation.noise_sd * bands.factor)} {bands.unit}"
     origin = f"the same share of the largest {case.response} as the test's noise is of its largest stress"
-    percent = percent_of(table["draws"].max())
-    against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     forces = Picture(
-        "forces", lambda: force_and_strain_figure(simulation, table),
+        "forces", lambda: force_and_strain_figure(simulation, bands),
         f"Band of the {case.response}, and what is strained beyond the measurements",
-        f"Left: {case.response} over {case.travel_name}: mean and {percent} band over draws of the posterior, "
-        f"without the noise of a measurement{against}.{_corrected(table)} Right: how much of the body "
-        "is strained beyond the measured I1 or I2, and how much of the strain energy is there.",
+        f"Left: {case.response}{_about_band(simulation, bands)} Right: how much of the body is strained beyond the "
+        "measured I1 or I2, and how much of the strain energy is there.",
     )  # fmt: skip
     sections = [Section("What is strained beyond the measurements", (forces,))]
     if MATERIAL_ONLY in simulation.forces:
         shares = Picture(
-            "shares", lambda: share_figure(simulation, table), "Shares of the variance, and standard deviations",
+            "shares", lambda: share_figure(simulation, bands), "Shares of the variance, and standard deviations",
             f"Left: shares of the variance of a new measurement of the {case.response}; shaded, ± one standard error "
             f"of {draws} draws (bootstrap). Right: how much the {case.response} would spread by each part alone; where "
             "the total is less than its parts, they compensate each other.",
@@ -287,8 +243,8 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
             f"Q is the {case.response} of a draw with its discrepancy, Q0 that of the same draw with its material "
             "parameters alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of "
             f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise"
-            f"{', with **mesh**, the error of the correction for the size of the cells' * is_mesh_free(table)}.",
-            *[of_sources(table)] * bool(simulation.ensembles[COMPLETE].sources),
+            f"{', with **mesh**, the error of the correction for the size of the cells' * bands.is_mesh_free}.",
+            *[bands.of_sources] * bool(simulation.ensembles[COMPLETE].sources),
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
         )
@@ -368,17 +324,14 @@ def _size(name: str, value: float | str | dict[str, str], unit: str) -> str:
     return f"{value:g}" if name in ("fineness", "parts") else f"{value:g} {unit}"
 
 
-def _lead(simulation: Simulation, table: pd.DataFrame) -> str:
+def _lead(simulation: Simulation, bands: Bands) -> str:
     """Return the finding in a sentence or two."""
-    unit, factor = handy_unit(table, simulation.case.response_unit)
-    last_step = last_row(table)
-    mean, _, ends = band_cells(last_step, factor, prefix_of(table))
-    percent = percent_of(last_step["draws"])
-    case = simulation.case
-    article, travel = "an" if case.travel_name[0] in "aeiou" else "a", case.shown(last_step[case.travel_column])
+    case, last, unit = simulation.case, bands.last, bands.unit
+    mean, _, ends = bands.band(last)
+    article, travel = "an" if case.travel_name[0] in "aeiou" else "a", case.shown(last[case.travel_column])
     text = f"At {article} {case.travel_name} of {travel} the {case.response} is {mean} {unit}"
-    text += f" ({percent}: {ends} {unit})."
+    text += f" ({percent_of(last['draws'])}: {ends} {unit})."
     if WITHOUT in simulation.forces:
-        without, _, without_ends = band_cells(last_step, factor * mesh_ratio(last_step), "without_")
+        without, _, without_ends = bands.band(last, "without_")
         text += f" Without discrepancy it is {without} {unit} ({without_ends} {unit})."
     return text

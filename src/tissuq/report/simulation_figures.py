@@ -16,7 +16,7 @@ from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
 from tissuq.finite_elements.case import ACROSS, AXIAL, Mesh
 from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
-from tissuq.report.band_table import LABELS, SHARES, handy_unit, is_mesh_free, percent_of, prefix_of
+from tissuq.report.band_table import LABELS, SHARES, Bands
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +28,7 @@ __all__ = [
     "field_figure",
     "force_and_strain_figure",
     "force_figure",
+    "moments",
     "share_figure",
     "write_collection",
     "write_vtu",
@@ -39,39 +40,36 @@ MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
 
 
-def force_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
+def force_figure(simulation: Simulation, bands: Bands) -> Figure:
     """Return the bands of the force, for the head of a page."""
     with new_figure(ANSWER_WIDTH, 3.9) as figure:
-        _draw_forces(figure.subplots(), simulation, table[table["draws"] > 1])
+        _draw_forces(figure.subplots(), simulation, bands)
     return figure
 
 
-def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> None:
-    unit, factor = handy_unit(table, simulation.case.response_unit)
+def _draw_forces(axis: Axes, simulation: Simulation, bands: Bands) -> None:
+    table = bands.of_several
     travel = _from_zero(table[simulation.case.travel_column])
-    percent = percent_of(table["draws"].max())
-    bands = [
-        (prefix_of(table), "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)
-    ]
+    drawn = [(bands.prefix, "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)]
     if WITHOUT in simulation.forces:
-        bands.append(("without_", "fitted without discrepancy", TRUTH, "--", 0.15))
-    ratio = table["mesh_free_mean"] / table["mean"] if is_mesh_free(table) else 1.0
-    for prefix, label, color, line, alpha in bands:
-        times = ratio if prefix == "without_" else 1.0
-        low, mean, high = (_from_zero(table[f"{prefix}{name}"] * times) * factor for name in ("low", "mean", "high"))
-        pieces.band(axis, travel, low, high, color=color, strength=alpha, label=f"{label}, {percent}")
+        drawn.append(("without_", "fitted without discrepancy", TRUTH, "--", 0.15))
+    for prefix, label, color, line, alpha in drawn:
+        factor = bands.factor
+        ratio = bands.mesh_ratio(table) if prefix == "without_" else 1.0
+        low, mean, high = (_from_zero(table[f"{prefix}{name}"] * ratio) * factor for name in ("low", "mean", "high"))
+        pieces.band(axis, travel, low, high, color=color, strength=alpha, label=f"{label}, {bands.percent}")
         pieces.line(axis, travel, mean, style=line, color=color, label="mean")
     axis.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
-    axis.set_ylabel(f"{simulation.case.response} [{unit}]")
+    axis.set_ylabel(f"{simulation.case.response} [{bands.unit}]")
     axis.set_xlim(0, simulation.case.travel)
     axis.legend(fontsize=9)
 
 
-def force_and_strain_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
+def force_and_strain_figure(simulation: Simulation, bands: Bands) -> Figure:
     """Draw the bands of the force, and beside them what of the body is strained beyond the measurements."""
     with new_figure(9.6, 3.9) as figure:
         axis, share_axis = figure.subplots(1, 2, width_ratios=(1.75, 1))
-        _draw_forces(axis, simulation, table[table["draws"] > 1])
+        _draw_forces(axis, simulation, bands)
         for rows, label, color in (
             (simulation.energy_beyond, "of the strain energy", INK), (simulation.volume_beyond, "of the volume", BASE),
         ):  # fmt: skip
@@ -95,14 +93,13 @@ def _from_zero(values: Any) -> FloatArray:
     return np.concatenate([[0.0], np.asarray(values, dtype=np.float64)])
 
 
-def share_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
+def share_figure(simulation: Simulation, bands: Bands) -> Figure:
     """Draw the shares of the variance, and the standard deviations of the parts that they are made of."""
     with new_figure(9.6, 3.9) as figure:
         axis, sd_axis = figure.subplots(1, 2)
-        table = table[table["draws"] > 1]
+        table = bands.of_several
         travel = table[simulation.case.travel_column].to_numpy()
-        draw_shares(axis, travel, table, SHARES)
-        unit, factor = handy_unit(table, simulation.case.response_unit)
+        draw_shares(axis, simulation.case.travel_column, table)
         sizes = {
             f"{simulation.case.response} of a draw": (table["sd"], INK, "-"),
             "of its parameters alone": (table["alone_sd"], BAND, "--"),
@@ -110,8 +107,8 @@ def share_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
             "noise": (np.full(len(travel), simulation.noise_sd), BASE, "--"),
         }
         for label, (sd, color, line) in sizes.items():
-            sd_axis.plot(travel, factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
-        sd_axis.set_title(f"Standard deviation between draws [{unit}]")
+            sd_axis.plot(travel, bands.factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
+        sd_axis.set_title(f"Standard deviation between draws [{bands.unit}]")
         sd_axis.set_ylim(0)
         for panel in (axis, sd_axis):
             panel.set_xlim(0, simulation.case.travel * 1.02)
@@ -120,15 +117,15 @@ def share_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
     return figure
 
 
-def draw_shares(axis: Axes, along: Any, table: pd.DataFrame, colors: Mapping[str, str]) -> None:
-    """Draw the shares of a variance, ± their standard errors, over time or travel."""
+def draw_shares(axis: Axes, along: str, table: pd.DataFrame) -> None:
+    """Draw the shares of a variance, ± their standard errors, over a column: time or travel."""
     axis.axhline(0, color=INK, lw=0.8)
-    for name, color in colors.items():
+    for name, color in SHARES.items():
         if name not in table:
             continue
         share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
-        pieces.band(axis, along, share - error, share + error, color=color, strength=0.2)
-        pieces.line(axis, along, share, color=color, label=LABELS[name], marker="o", ms=3.5)
+        pieces.band(axis, table[along], share - error, share + error, color=color, strength=0.2)
+        pieces.line(axis, table[along], share, color=color, label=LABELS[name], marker="o", ms=3.5)
     axis.set_title("Share of the variance [%]")
     axis.legend(fontsize=9)
 
@@ -209,3 +206,12 @@ def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:
         SubElement(collection, "DataSet", timestep=f"{time:.12g}", part="0", file=name)
     indent(file)
     ElementTree(file).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return mean and standard deviation over the first axis, by labels."""
+    moments = {}
+    for name, values in fields.items():
+        moments[f"mean {name}"] = values.mean(axis=0)
+        moments[f"sd of {name}"] = values.std(axis=0, ddof=1)
+    return moments

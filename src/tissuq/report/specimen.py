@@ -12,17 +12,25 @@ from tissuq.assessment import Assessment
 from tissuq.assessment.answer import NOTABLE_SHARE
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.experiments.units import stress_unit
+from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described
 from tissuq.report.chart import chart_data
-from tissuq.report.figures import answer_figure, described_curves, marginal_figure, predictive_figure
-from tissuq.report.held_out import held_out_files, held_out_table
+from tissuq.report.figures import described_curves, marginal_figure, predictive_figure
 from tissuq.report.inputs import inputs_of
-from tissuq.report.measured import computed_section, data_section, named, subject_of
-from tissuq.report.methods import methods_section
+from tissuq.report.measured import computed_section, data_section, methods_section, named, subject_of
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import ASSESSMENT
-from tissuq.report.stability import stability_cells, stability_rows, stability_section
-from tissuq.report.summary import parameter_table, summary_row, summary_table, summary_tables
+from tissuq.report.summary import (
+    held_out_files,
+    held_out_table,
+    parameter_table,
+    stability_cells,
+    stability_rows,
+    stability_section,
+    summary_row,
+    summary_table,
+    summary_tables,
+)
 from tissuq.report.tables import Row, significant
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.specimen import SpecimenStudy
@@ -30,7 +38,6 @@ from tissuq.studies.specimen import SpecimenStudy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tissuq.posterior.posterior import Posterior
 
 __all__ = ["specimen_answer", "specimen_result"]
 
@@ -76,7 +83,11 @@ def specimen_answer(study: SpecimenStudy) -> Result:
 def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
     """Return what a fit says; ``sources`` are the files that were read, one a test."""
     inputs, unit, posteriors = inputs_of(study.settings, study.experiment, sources), study.unit, study.posteriors
-    summary = [_summary_row(study, name, posterior) for name, posterior in posteriors.items()]
+    summary = []
+    for name, posterior in posteriors.items():
+        more: Row = {"estimand": posterior.model.tolerances.estimand, "noise_lag": posterior.model.fitted_errors.lag}
+        more |= stability_cells(posterior)
+        summary.append(summary_row(name, posterior, study.seconds[name], more=more))
 
     @cache
     def computed() -> dict[str, Sequence[Described]]:
@@ -87,7 +98,7 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
         command=f"fit{inputs.options}",
         picture=Picture(
             "answer",
-            lambda: answer_figure(posteriors[study.main], unit, is_narrow=True, computed=computed()[study.main]),
+            lambda: answer_on_new_figure(computed()[study.main], unit, is_narrow=True),
             "Measurements, and the 95 % predictive band of material, discrepancy and noise",
             "Measurements, and the 95 % band of new ones.",
             chart=lambda: chart_data(posteriors, study.main, unit, computed()),
@@ -98,11 +109,6 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
         recipe=inputs.recipe,
         without=inputs.without,
     )
-
-
-def _summary_row(study: SpecimenStudy, name: str, posterior: Posterior) -> Row:
-    more: Row = {"estimand": posterior.model.tolerances.estimand, "noise_lag": posterior.model.fitted_errors.lag}
-    return summary_row(name, posterior, study.seconds[name], more=more | stability_cells(posterior))
 
 
 def _files(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:

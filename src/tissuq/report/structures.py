@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,19 +20,18 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["readable_structures", "structures_result"]
+__all__ = ["structures_result"]
 
-HEADERS = [
-    "truth",
-    "structure",
-    "sets of tests",
-    "in 95 %",
-    "oracle in 95 %",
-    "half width",
-    "over the oracle's",
-    "error",
-]
-"""Of `readable_structures`."""
+COLUMNS: dict[str, Callable[[Any], str]] = {
+    "truth": itemgetter("truth"),
+    "structure": itemgetter("structure"),
+    "sets of tests": lambda row: str(row["replicates"]),
+    "in 95 %": lambda row: f"{100 * row['inside']:.0f} ± {100 * row['inside_error']:.0f} %",
+    "oracle in 95 %": lambda row: f"{100 * row['oracle_inside']:.0f} %",
+    "half width": lambda row: f"{100 * row['half_width']:.1f} %",
+    "over the oracle's": lambda row: f"{row['width_ratio']:.2f}",
+    "error": lambda row: f"{100 * row['error']:.1f} %",
+}
 NOTE = (
     "In 95 %: bands that hold the true force, ± one standard error. Half width of the band and error of its mean: "
     "median, over the true force. Over the oracle's: median ratio of widths."
@@ -82,7 +83,9 @@ def structures_result(settings: StructureStudySettings, results: list[dict[str, 
             "Every set of tests: band (blue) and mean over the true force, and the band of an oracle that knows the "
             "law (grey). Line: the truth.",
         ),
-        tables=(Table(HEADERS, readable_structures(summary), "Forces at the end", (1,), NOTE),),
+        tables=(
+            Table.of(summary.to_dict("records"), COLUMNS, "Forces at the end", text_columns=(1,), note=NOTE),
+        ),
         sections=tuple(sections),
         files={"summary.csv": summary, "bands.csv": _rows(results)},
     )  # fmt: skip
@@ -92,23 +95,11 @@ def _numbers(summary: pd.DataFrame) -> tuple[Number, ...]:
     return tuple(
         Number(
             f"{row['truth']}, {row['structure']}: bands that hold the force",
-            f"{100 * row['inside']:.0f} ± {100 * row['inside_error']:.0f} %",
+            COLUMNS["in 95 %"](row),
             remark=f"of {row['replicates']}; {row['width_ratio']:.2g} times as wide as an oracle's",
         )
         for row in summary.to_dict("records")[:MAX_NUMBERS]
     )
-
-
-def readable_structures(summary: pd.DataFrame) -> list[list[str]]:
-    """Return the rows of the summary as text."""
-    return [
-        [
-            row["truth"], row["structure"], str(row["replicates"]),
-            f"{100 * row['inside']:.0f} ± {100 * row['inside_error']:.0f} %", f"{100 * row['oracle_inside']:.0f} %",
-            f"{100 * row['half_width']:.1f} %", f"{row['width_ratio']:.2f}", f"{100 * row['error']:.1f} %",
-        ]
-        for row in summary.to_dict("records")
-    ]  # fmt: skip
 
 
 def _rows(results: list[dict[str, Any]]) -> list[dict[str, Any]]:

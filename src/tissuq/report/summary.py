@@ -1,17 +1,28 @@
-"""The discrepancies of a run beside one another: rows for files, and tables for people in the unit of the data."""
+"""Tables of a fit, as rows for files and for people: discrepancies, parameters, stability, tests from the others."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior.labelled import summaries, summaries_in
 from tissuq.posterior.posterior import Posterior
-from tissuq.report.result import Table
-from tissuq.report.stability import STABILITY
-from tissuq.report.tables import Row, in_unit_of, interval, known_number, percent, stretch_in_words, with_named_units
+from tissuq.report.result import Section, Table
+from tissuq.report.tables import (
+    Row,
+    interval,
+    known_number,
+    percent,
+    significant,
+    stretch_in_words,
+    table_files,
+)
 
-__all__ = ["parameter_table", "summary_row", "summary_table", "summary_tables"]
+__all__ = [
+    "SAME_STATES", "held_out_files", "held_out_table", "parameter_rows", "parameter_table", "stability_cells",
+    "stability_rows", "stability_section", "summary_row", "summary_table", "summary_tables",
+]  # fmt: skip
 
 HOW_TO_READ = (
     "Intervals are the shortest that hold 95 %. In band, alone: share of measurements inside the 95 % band with the "
@@ -20,6 +31,32 @@ HOW_TO_READ = (
 )
 STABLE = " Stable: probability of stability over the measured stretches; all loading modes: `stability.csv`."
 LOST = " Lost at stretch: median [95 %] of the draws that become unstable."
+STABILITY = ("stable", "lost_at", "lost_at_low", "lost_at_high")
+"""Of `stability_cells`."""
+SAME_STATES = (
+    "Tension in one mode may be compression in another: what is pressed to 0.6 along two axes (equibiaxial "
+    "compression) grows to 1 / 0.6² = 2.8 along the third, for its volume stays: the state of uniaxial tension to 2.8."
+)
+STABILITY_HEADERS = [
+    "discrepancy", "loading mode", "stretch", "stable throughout, probability", "lost in compression at",
+    "lost in tension at",
+]  # fmt: skip
+STABLE_MEANS = (
+    "Stable means that from rest onward the greater principal stress lies along the greater stretch (Baker-Ericksen), "
+    "every small change of stress does positive work (Drucker), and the engineering stress rises with the stretch. It "
+    "is checked over the stretches within which both invariants were measured, for the material together with a "
+    "discrepancy that is an energy; any other discrepancy does not affect stability and is left out. Lost in "
+    "compression or tension: median and 95 % interval of the draws that become unstable, if stability is lost with a "
+    "probability above 5 %."
+)
+OF_HEADLINE = ("median", "hdi_low", "hdi_high")
+"""What is said of the headline parameter from the other tests."""
+HELD_OUT_NOTE = (
+    "Every test is predicted by a fit of the others alone. Inside: how many of its measurements lie in the predicted "
+    "band, 95 % where all is well. Extrapolated: how many lie at strains that the others did not reach. Band ±, the "
+    "half width of the band, and off by, how far its middle is off: root mean squares of the measurements that are not "
+    "extrapolated, relative to that of their stress; small is good."
+)
 
 
 def summary_row(
@@ -47,11 +84,6 @@ def summary_row(
         **(more or {}),
         "seconds": seconds,
     }
-
-
-def headline_columns(row: Row) -> list[str]:
-    """Return the columns of a row that begin with its headline parameter, in whose unit they are."""
-    return [name for name in row if name.startswith(f"{headline_of(row)}_")]
 
 
 def headline_of(row: Row) -> str:
@@ -88,12 +120,11 @@ def summary_tables(
     summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "", unit: StressUnit | None = None
 ) -> dict[str, list[Row]]:
     """Return summary.csv, summary.json and parameters.csv; the summary, in MPa, in a unit where one is said."""
-    columns = headline_columns(summary[0])
-    return {
-        f"summary{suffix}.csv": summary if unit is None else with_named_units(summary, columns, unit),
-        f"summary{suffix}.json": summary if unit is None else in_unit_of(summary, columns, unit),
-        f"parameters{suffix}.csv": parameter_rows(posteriors),
-    }
+    columns = [name for name in summary[0] if name.startswith(f"{headline_of(summary[0])}_")]
+    name, parameters = f"summary{suffix}", {f"parameters{suffix}.csv": parameter_rows(posteriors)}
+    if unit is None:
+        return {f"{name}.csv": summary, f"{name}.json": summary} | parameters
+    return table_files(name, summary, columns, unit) | parameters
 
 
 def summary_table(rows: list[Row], unit: StressUnit, title: str, main: str = "") -> Table:
@@ -146,3 +177,78 @@ def parameter_table(posteriors: Mapping[str, Posterior]) -> Table:
         rows.append([*names, interval(median, median, spread)[0], *moments, f"[{ends[0]}, {ends[1]}]"])
     headers = ["discrepancy", "parameter", "unit", "prior", "median", "mean", "sd", "95 % interval"]
     return Table(headers, rows, text_columns=(1, 2, 3))
+
+
+def stability_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
+    """Return how far every formulation is stable in every loading mode, where its energy tells."""
+    rows = []
+    for formulation, posterior in posteriors.items():
+        for mode, stable_range in posterior.stable_ranges.items():
+            row: Row = {
+                "formulation": formulation,
+                "mode": mode,
+                "stretch_low": stable_range.low,
+                "stretch_high": stable_range.high,
+            }
+            row |= {
+                "stable": stable_range.probability,
+                "surely_low": stable_range.surely_low,
+                "surely_high": stable_range.surely_high,
+            }
+            for side, loss in (("below", stable_range.loss_below), ("above", stable_range.loss_above)):
+                row |= {f"lost_{side}_{name}": known_number(value) for name, value in loss._asdict().items()}
+            rows.append(row)
+    return rows
+
+
+def stability_cells(posterior: Posterior) -> Row:
+    """Return how probable stability is over the measured stretches, and where it is lost, likelier below or above one.
+
+    None where it is hardly ever lost.
+    """
+    modes = [mode.name for mode in posterior.model.experiment.modes]
+    ranges = [stable_range for name, stable_range in posterior.stable_ranges.items() if name in modes]
+    lowest = min(ranges, key=lambda stable_range: stable_range.probability, default=None)
+    if lowest is None:
+        return dict.fromkeys(STABILITY)
+    losses = lowest.loss[1:] if lowest.loss.probability > MIN_LOSS_PROBABILITY else (None, None, None)
+    return dict(zip(STABILITY, (lowest.probability, *losses), strict=True))
+
+
+def stability_section(rows: list[Row]) -> Section:
+    """Return the rows of stability for people; no stretch where it is hardly ever lost."""
+    cells = [
+        [
+            row["formulation"],
+            row["mode"],
+            f"{row['stretch_low']:.3g} to {row['stretch_high']:.3g}",
+            percent(row["stable"]),
+            *(
+                stretch_in_words(*(row[f"lost_{side}_{name}"] for name in ("median", "low", "high")))
+                if row[f"lost_{side}_probability"] > MIN_LOSS_PROBABILITY
+                else ""
+                for side in ("below", "above")
+            ),
+        ]
+        for row in rows
+    ]
+    return Section(
+        "Where it is stable", (STABLE_MEANS, Table(STABILITY_HEADERS, cells, text_columns=(1,)), SAME_STATES)
+    )
+
+
+def held_out_files(rows: Sequence[Row], headline: str, unit: StressUnit) -> dict[str, list[Row]]:
+    """Return the rows, whose headline parameter is in MPa, as files in a unit."""
+    return table_files("held_out", rows, [f"{headline}_{name}" for name in OF_HEADLINE], unit)
+
+
+def held_out_table(rows: Sequence[Row], headline: str, unit: StressUnit) -> Table:
+    """Return the rows for people."""
+    headers = ["discrepancy", "test left out", "measured", "inside band", "extrapolated", "band ±", "off by"]
+    cells = []
+    for row in rows:
+        median, low, high = (significant(row[f"{headline}_{name}"] / unit.to_mpa) for name in OF_HEADLINE)
+        shares = [percent(row[name]) for name in ("inside", "beyond", "half_width", "error")]
+        cells.append([row["formulation"], row["test"], row["measured"], *shares, f"{median} [{low}, {high}]"])
+    headers.append(f"{headline} of the others, {unit.name}")
+    return Table(headers, cells, "Each test predicted from the others", (1, 2), HELD_OUT_NOTE)

@@ -12,8 +12,8 @@ from typing import Any
 from tissuq.experiments.units import StressUnit
 
 __all__ = [
-    "Row", "in_unit_of", "interval", "known_number", "percent", "significant", "stretch_in_words", "with_named_units",
-    "write_csv", "write_json",
+    "Row", "in_unit_of", "interval", "known_number", "percent", "significant", "stretch_in_words", "table_files",
+    "with_named_units", "write_csv", "write_json",
 ]  # fmt: skip
 
 Row = dict[str, Any]
@@ -28,7 +28,11 @@ UNIT = "unit"
 
 def in_unit_of(rows: Sequence[Row], columns: Sequence[str], unit: StressUnit) -> list[Row]:
     """Return rows whose columns in MPa are in another unit, which stands among them."""
-    return [_divided(row, columns, unit.to_mpa) | {UNIT: unit.name} for row in rows]
+    return [
+        {name: value / unit.to_mpa if name in columns and value is not None else value for name, value in row.items()}
+        | {UNIT: unit.name}
+        for row in rows
+    ]
 
 
 def with_named_units(rows: Sequence[Row], columns: Sequence[str], unit: StressUnit) -> list[Row]:
@@ -40,8 +44,9 @@ def with_named_units(rows: Sequence[Row], columns: Sequence[str], unit: StressUn
     ]
 
 
-def _divided(row: Row, columns: Sequence[str], divisor: float) -> Row:
-    return {name: value / divisor if name in columns and value is not None else value for name, value in row.items()}
+def table_files(name: str, rows: Sequence[Row], columns: Sequence[str], unit: StressUnit) -> dict[str, list[Row]]:
+    """Return rows whose columns are in MPa as files in another unit: CSV with it in the heads, and JSON with it."""
+    return {f"{name}.csv": with_named_units(rows, columns, unit), f"{name}.json": in_unit_of(rows, columns, unit)}
 
 
 def known_number(number: float) -> float | None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["readable_tissues", "tissue_result"]
+__all__ = ["tissue_result"]
 
 SHARES = {"inside_50": "in 50 %", "inside_80": "in 80 %", "inside_95": "in 95 %", "useful": "useful"}
 RATIOS = {"half_width": "half width", "error": "error", "score": "score"}
@@ -47,17 +47,10 @@ def tissue_result(settings: TissueSettings, results: list[dict[str, Any]]) -> Re
     import pandas as pd
 
     summary = summarise_tissues(results)
-    predictions = pd.DataFrame(map(_plain, results))
+    predictions = pd.DataFrame(results).drop(columns="key").assign(fitted=["; ".join(row["fitted"]) for row in results])
     sets = list(dict.fromkeys(result["tissue"] for result in results))
     nominal, by_class = PROBABILITIES[-1], summary[summary["class"] != ALL]
-    tables = tuple(
-        Table(
-            *readable_tissues(rows),
-            TESTS.get(str(protocol), str(protocol)),
-            (1,) if rows["class"].nunique() > 1 else (),
-        )
-        for protocol, rows in summary.groupby("protocol", sort=False, observed=True)
-    )
+    protocols = summary.groupby("protocol", sort=False, observed=True)
     return Result(
         command="study tissues",
         title="Do predictions of real tests hold?",
@@ -73,7 +66,7 @@ def tissue_result(settings: TissueSettings, results: list[dict[str, Any]]) -> Re
             "Share of the measurements in the 95 % band", "A mark for each protocol and class of tissue; line: "
             "nominal.",
         ),
-        tables=tables,
+        tables=tuple(_table(str(protocol), rows) for protocol, rows in protocols),
         sections=_sections(settings, summary, results, sets),
         files={
             "summary.csv": summary,
@@ -121,47 +114,40 @@ def _sections(
         "are made for each set and protocol.",
     ]
     sections = [Section("By class of tissue", (figure,)), Section("How to read it", (tuple(reading),))]
-    if failures := _failures(results):
-        sections.append(Section("Not predicted", (tuple(failures),)))
+    failed = [row for row in results if "failure" in row]
+    if failed:
+        texts = {f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in failed}
+        sections.append(Section("Not predicted", (tuple(sorted(texts)),)))
     origin = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
     return (*sections, Section("Sets", (f"{', '.join(sets)}{origin}.",)))
 
 
-def readable_tissues(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Return headers and rows of a summary as text; columns that say nothing are left out."""
-    labels = [name for name in ("protocol", "class") if summary[name].nunique() > 1]
+def _table(protocol: str, summary: pd.DataFrame) -> Table:
+    """Return the summary of a protocol as text; columns that say nothing are left out."""
+    labels = ["class"] if summary["class"].nunique() > 1 else []
     headers = [*labels, "formulation", "predictions", *SHARES.values(), *RATIOS.values()]
     has_moduli = summary["modulus_inside"].notna().any()
+
+    def ratio(number: float) -> str:
+        return significant(number, 2) if number == number else "-"
+
     rows = [
         [
             *(str(row[name]) for name in (*labels, "formulation", "predictions")),
             *(_percent(row[name]) for name in SHARES),
             *(_percent(row[name]) for name in RATIOS),
-            *([_percent(row["modulus_inside"]), _number(row["modulus_ratio"])] if has_moduli else []),
+            *([_percent(row["modulus_inside"]), ratio(row["modulus_ratio"])] if has_moduli else []),
         ]
         for row in summary.to_dict("records")
     ]
-    return [*headers, *(["modulus in", "upper / lower end"] if has_moduli else [])], rows
-
-
-def _number(ratio: float) -> str:
-    return significant(ratio, 2) if ratio == ratio else "-"
-
-
-def _failures(results: list[dict[str, Any]]) -> list[str]:
-    rows = [row for row in results if "failure" in row]
-    return sorted({f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in rows})
+    headers += ["modulus in", "upper / lower end"] if has_moduli else []
+    return Table(headers, rows, TESTS.get(protocol, protocol), (1,) if labels else ())
 
 
 def _percent(share: float) -> str:
     if share != share:
         return "-"
     return f"{100 * share:.0f} %" if share < MIN_TIMES else f"{share:.3g} times"
-
-
-def _plain(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a result as a row of a table."""
-    return {name: value for name, value in result.items() if name != "key"} | {"fitted": "; ".join(result["fitted"])}
 
 
 def _figure(summary: pd.DataFrame) -> Figure:

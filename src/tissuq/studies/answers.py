@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of, stated
+from tissuq.studies.settings import imported
 
 __all__ = ["Answer", "answers_in", "options_in", "with_options"]
 
@@ -27,8 +28,12 @@ OTHER_ROLES = re.compile(r"\(or ((?:\w+=(?:, | or )?)+)\)")
 PLACEHOLDERS = ("NAME", "NUMBER")
 WORDS = frozenset(["out", "for", "or", "and", "if", "to", "with", "instead", "once"])
 """What may follow an option in a sentence, and is no value."""
-CHOICES = ("mode", "strain-type", "stress-type")
-"""Options of which there is a list of values."""
+CHOICES = {
+    "mode": "tissuq.experiments.modes:loading_modes",
+    "strain-type": "tissuq.experiments.reading.measures:STRAIN_MEASURES",
+    "stress-type": "tissuq.experiments.reading.measures:STRESS_MEASURES",
+}
+"""Options of which there is a list of values, and what has or returns it."""
 
 
 @dataclass(frozen=True)
@@ -88,12 +93,14 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
             if {**settings, **(settings.get("dimensions") or {})}.get(setting) is not None:
                 answers.append(Answer(((f"--{name}", ""),), setting))
         elif name == "column":
-            roles = [value.partition("=")[0], *_other_roles(message[match.end() :])]
+            others = OTHER_ROLES.match(message[match.end() :].lstrip())
+            roles = [value.partition("=")[0], *re.findall(r"(\w+)=", others[1] if others else "")]
             names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
             pairs = [f"{role}={column}" for role in roles for column in names] if names else [value]
             answers += [Answer((("column", pair),)) for pair in pairs]
         elif name in CHOICES and not value:
-            answers += [Answer(((name, choice),)) for choice in _values(name)]
+            choices = imported(CHOICES[name])
+            answers += [Answer(((name, choice),)) for choice in (choices() if callable(choices) else choices)]
         elif value or name in SWITCHES or name in DIMENSIONS:
             if is_joined:
                 answers[-1] = Answer((*answers[-1].options, (name, value)))
@@ -151,20 +158,3 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
         earlier = merged.get(setting)
         merged[setting] = {**earlier, **value} if isinstance(value, dict) and isinstance(earlier, dict) else value
     return merged
-
-
-def _other_roles(text: str) -> list[str]:
-    match = OTHER_ROLES.match(text.lstrip())
-    return re.findall(r"(\w+)=", match[1]) if match else []
-
-
-def _values(name: str) -> list[str]:
-    from tissuq.experiments.modes import loading_modes
-    from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
-
-    choices: dict[str, Iterable[str]] = {
-        "mode": loading_modes(),
-        "strain-type": STRAIN_MEASURES,
-        "stress-type": STRESS_MEASURES,
-    }
-    return list(choices[name])

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 from pydantic import field_validator, model_validator
 
 from tissuq.studies.model_settings import ModelSettings
-from tissuq.studies.option import argument, option
+from tissuq.studies.option import argument, only_rows, option, seed
 from tissuq.studies.option_texts import column, number_or_text, pairs_of, priors, sd_or_unknown
 from tissuq.studies.settings import positive_or_unknown
-from tissuq.studies.shared_options import only_rows, seed
 
 if TYPE_CHECKING:
     from tissuq.emulation.deck_forward import DeckForward
@@ -47,7 +46,6 @@ class CalibrationSettings(ModelSettings):
         "CSV or Excel file with a column of controls and one of measured values (with several --qoi one of each name); "
         "of several experiments a file each.",
         takes=list[Path],
-        parse=lambda paths: tuple(map(str, paths)),
         min_length=1,
     )
     forward: str | None = option(
@@ -60,7 +58,6 @@ class CalibrationSettings(ModelSettings):
         "Instead: your finite-element model, a deck as of tissuq ensemble; of several files one each, in their order.",
         name="model",
         takes=list[Path],
-        parse=lambda paths: tuple(map(str, paths)),
         group=OWN,
     )
     replaced: tuple[str, ...] = option(
@@ -107,7 +104,6 @@ class CalibrationSettings(ModelSettings):
         None,
         "Run folder of tissuq fit: the priors of the parameters of --material are its posterior.",
         takes=Path,
-        parse=str,
     )
     control: str | int | None = option(
         None, "Column of the control [the first of two; with several --qoi the only other one].", parse=column

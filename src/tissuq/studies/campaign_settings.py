@@ -8,10 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator
 
 from tissuq.parameters.checks import MAX_SEED
-from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option import Settings, argument, option, seed
 from tissuq.studies.option_texts import priors, tolerances
-from tissuq.studies.settings import SizesOfErrors
-from tissuq.studies.shared_options import seed
+from tissuq.studies.settings import SizesOfErrors, imported
 
 __all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions"]
 
@@ -20,12 +19,6 @@ NoiseKnown = Annotated[
     BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
 ]
 NOISE = "known or unknown to the fits."
-
-
-def _discrepancies() -> tuple[str, ...]:
-    from tissuq.model.discrepancy import discrepancies
-
-    return tuple(discrepancies())
 
 
 class PaperOptions(Settings):
@@ -68,7 +61,7 @@ class SbcOptions(Settings):
     material: str = option("neo-hookean", "The material that is calibrated.")
     formulations: tuple[str, ...] = option(
         help="Discrepancy; repeat for more [all of them].",
-        default_factory=_discrepancies,
+        default_factory=lambda: tuple(imported("tissuq.model.discrepancy:discrepancies")()),
         name="discrepancy",
         min_length=1,
     )

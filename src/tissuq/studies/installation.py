@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import metadata
 
@@ -62,11 +61,6 @@ class Extra:
     purpose: str
     packages: tuple[Package, ...]
 
-    @property
-    def is_installed(self) -> bool:
-        """Whether all its packages are here in a version that is enough."""
-        return all(package.is_enough for package in self.packages)
-
 
 @dataclass(frozen=True)
 class Program:
@@ -85,14 +79,14 @@ def needed() -> list[Package]:
     >>> all(package.is_enough for package in needed())
     True
     """
-    return _packages(_requirements(None))
+    return _packages(None)
 
 
 def extras() -> list[Extra]:
     """Return the extras that add something for a user, with their packages."""
     names = metadata.metadata("tissuq").get_all("Provides-Extra") or []
     users = sorted(set(names) - set(DEVELOPER_EXTRAS))
-    return [Extra(name, EXTRAS.get(name, ""), tuple(_packages(_requirements(name)))) for name in users]
+    return [Extra(name, EXTRAS.get(name, ""), tuple(_packages(name))) for name in users]
 
 
 def programs() -> list[Program]:
@@ -103,19 +97,15 @@ def programs() -> list[Program]:
     ]
 
 
-def _requirements(extra: str | None) -> list[str]:
-    """Return the requirements of an extra, or those without one, without what follows the semicolon."""
+def _packages(extra: str | None) -> list[Package]:
+    """Return what is here of the requirements of an extra, or of those without one."""
     requirements = []
     for line in metadata.requires("tissuq") or []:
         requirement, _, marker = line.partition(";")
         named = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", marker)
         if (named[1] if named else None) == extra:
             requirements.append(requirement.strip())
-    return requirements
-
-
-def _packages(requirements: Iterable[str]) -> list[Package]:
-    return [_package(requirement) for requirement in sorted(requirements)]
+    return list(map(_package, sorted(requirements)))
 
 
 def _package(requirement: str) -> Package:

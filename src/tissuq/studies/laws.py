@@ -19,7 +19,7 @@ from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
-from tissuq.studies.specimen import priors_in_mpa, warnings_of_files
+from tissuq.studies.specimen import priors_in_mpa, shared_options, warnings_of_files
 from tissuq.studies.specimen_settings import LawSettings
 from tissuq.studies.stream import open_pool
 
@@ -138,14 +138,10 @@ def run_laws(
             experiment,
             ALL_LAWS if is_all else list(laws.values()),
             discrepancy=discrepancy,
-            noise=settings.noise_in(unit),
             priors=priors_in_mpa(settings, laws.values(), experiment),
-            tolerances=settings.tolerances_in(unit),
-            method=settings.method,
-            stable_in=settings.stable_in,
-            seed=settings.seed,
             step=step,
             pool=pool,
+            **shared_options(settings, unit),
         )
     return LawStudy(settings, experiment, comparison, warnings_of_files(readings))
 

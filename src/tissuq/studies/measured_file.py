@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self, cast
 
 from pydantic import Field, field_validator, model_validator
 
-from tissuq.studies.option import Settings, option
+from tissuq.studies.option import Settings, only_rows, option, seed
 from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown, tolerances
-from tissuq.studies.settings import SizesOfErrors, looked_up, positive_or_unknown
-from tissuq.studies.shared_options import only_rows, seed
+from tissuq.studies.settings import SizesOfErrors, positive_or_unknown, there_is
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -171,11 +170,11 @@ class FittedSettings(Settings):
         parse=sd_or_unknown,
     )
     noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
-        None, "Instead: unknown, proportional, repeats or another one, as for tissuq fit."
+        None,
+        "Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
+        "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again).",
     )
-    method: str = option(
-        "auto", "Of every specimen's fit: auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method"
-    )
+    method: str = option("auto", "auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method")
     seed: int = seed()
     estimand: str | None = option(
         None,
@@ -199,14 +198,7 @@ class FittedSettings(Settings):
             value, "the file's stress unit", "; noise of zero would make every measurement exact"
         )
 
-    @field_validator("estimand")
-    @classmethod
-    def _estimand_there_is(cls, name: str | None) -> str | None:
-        from tissuq.model.tolerances import Tolerances
-
-        if name is not None:
-            looked_up(Tolerances, name)
-        return name
+    _known_estimand = field_validator("estimand")(there_is("tissuq.model.tolerances:Tolerances"))
 
     @model_validator(mode="after")
     def _one_noise(self) -> Self:

@@ -6,42 +6,33 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option import Settings, argument, mesh_order, option, sampling, seed
 from tissuq.studies.option_texts import pairs_of
-from tissuq.studies.shared_options import mesh_order, sampling, seed
 
 if TYPE_CHECKING:
     from tissuq.export import CardSettings
 
-__all__ = ["EnsembleSettings", "ModelSettings"]
+__all__ = ["CardOptions", "EnsembleSettings", "ModelSettings"]
 
-GROUP = "Solver and cards"
+SOLVER, CARDS = "Solver", "Cards"
 MESH = "Error of the mesh"
 
 
-class ModelSettings(Settings):
-    """The solver of a deck, and the cards in it."""
+class CardOptions(Settings):
+    """What material cards are."""
 
-    solver: str | None = option(None, "ccx, febio4 or command [that of the deck].", group=GROUP)
-    command: str = option(
-        "", "Command of the solver, such as 'abaqus job={job} ask=off', {deck} with suffix.", group=GROUP
+    law: str | None = option(
+        None,
+        "Write the nearest polynomial, reduced-polynomial, ogden or (FEBio) mixture [the draws' own law where the code "
+        "has it, else the best of these].",
+        group=CARDS,
     )
-    deck: str | None = option(None, "abaqus, febio, ls-dyna or ansys [what the file is].", group=GROUP)
-    card_format: str | None = option(None, "Format of cards [that of the solver].", name="format", group=GROUP)
-    law: str | None = option(None, "Law of the cards, as of tissuq export.", group=GROUP)
-    order: int | None = option(None, "Order or number of terms of that law.", group=GROUP)
-    unit: str = option("MPa", "Unit of stress of the model: MPa, kPa or Pa.", group=GROUP)
+    order: int | None = option(None, "Order or number of terms of that law.", group=CARDS)
+    unit: str = option("MPa", "Unit of stress of the model: MPa, kPa or Pa.", group=CARDS)
     bulk_modulus: float | None = option(
-        None, "In that unit, of all draws [1000 times the mean initial shear modulus].", gt=0, lt=inf, group=GROUP
+        None, "In that unit, of all draws [1000 times the mean initial shear modulus].", gt=0, lt=inf, group=CARDS
     )
-    poisson: float | None = option(None, "Instead: Poisson's ratio of all draws.", group=GROUP)
-    also: list[str] = option(
-        default_factory=list,
-        help="Another file that the solver needs beside the deck; repeat for more.",
-        takes=list[Path],
-        parse=lambda files: list(map(str, files)),
-        group=GROUP,
-    )
+    poisson: float | None = option(None, "Instead: Poisson's ratio of all draws.", group=CARDS)
 
     def card_settings(self, **changes: Any) -> CardSettings:
         """Return the settings of the cards.
@@ -53,8 +44,24 @@ class ModelSettings(Settings):
         """
         from tissuq.export import CardSettings
 
-        names = "law", "order", "unit", "bulk_modulus", "poisson"
-        return CardSettings(**{name: getattr(self, name) for name in names}, **changes)
+        return CardSettings(**{name: getattr(self, name) for name in CardOptions.model_fields}, **changes)
+
+
+class ModelSettings(CardOptions):
+    """The solver of a deck, and the cards in it."""
+
+    solver: str | None = option(None, "ccx, febio4 or command [that of the deck].", group=SOLVER)
+    command: str = option(
+        "", "Command of the solver, such as 'abaqus job={job} ask=off', {deck} with suffix.", group=SOLVER
+    )
+    deck: str | None = option(None, "abaqus, febio, ls-dyna or ansys [what the file is].", group=SOLVER)
+    card_format: str | None = option(None, "Format of cards [that of the solver].", name="format", group=CARDS)
+    also: list[str] = option(
+        default_factory=list,
+        help="Another file that the solver needs beside the deck; repeat for more.",
+        takes=list[Path],
+        group=SOLVER,
+    )
 
 
 class EnsembleSettings(ModelSettings):
@@ -67,7 +74,6 @@ class EnsembleSettings(ModelSettings):
         ...,
         "Your model: a deck of CalculiX or Abaqus (.inp), FEBio (.feb), LS-DYNA (.k), ANSYS (.cdb).",
         takes=Path,
-        parse=str,
     )
     materials: dict[str, str] = option(
         ...,
@@ -92,7 +98,7 @@ class EnsembleSettings(ModelSettings):
     seed: int = seed()
     finer_model: str | None = option(
         None, "The same model with a finer mesh: one draw is run on it, too, for the error of the mesh.",
-        takes=Path, parse=str, group=MESH,
+        takes=Path, group=MESH,
     )  # fmt: skip
     cell_ratio: float | None = option(
         None, "How many times smaller its elements are [by their number].", gt=1, lt=inf, group=MESH

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from importlib import import_module
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from types import NoneType
 from typing import Any, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
-__all__ = ["Option", "Settings", "Slot", "argument", "option", "options_of", "slots_of", "stated"]
+from tissuq.parameters.checks import MAX_SEED
+from tissuq.studies.option_texts import pairs_of
+from tissuq.studies.settings import imported
+
+__all__ = [
+    "Option", "Settings", "Slot", "argument", "mesh_order", "only_rows", "option", "options_of", "sampling", "seed",
+    "slots_of", "stated",
+]  # fmt: skip
 
 
 class Settings(BaseModel):
@@ -19,13 +26,20 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _paths_as_text(cls, value: Any) -> Any:
+        """Take the paths of the command line as files of settings have them."""
+        if isinstance(value, list):
+            return [str(item) if isinstance(item, Path) else item for item in value]
+        return str(value) if isinstance(value, Path) else value
+
     @field_validator("*")
     @classmethod
     def _one_of_choices(cls, value: Any, info: ValidationInfo) -> Any:
         declared = cls.model_fields[str(info.field_name)].json_schema_extra
         if value is not None and isinstance(declared, Option) and declared.choices:
-            module, _, name = declared.choices.partition(":")
-            choices = get_args(getattr(import_module(module), name))
+            choices = get_args(imported(declared.choices))
             if value not in choices:
                 listed = ", ".join(map(repr, choices[:-1]))
                 raise ValueError(f"must be {listed} or {choices[-1]!r}, not {value!r}")
@@ -98,7 +112,7 @@ class Option:
             return list[int] if get_args(kind)[0] is int else list[str]
         if get_origin(kind) is dict or kind is dict:
             return list[str]
-        return kind if kind in (int, float, bool, str) or _is_path(kind) else str
+        return kind if kind in (int, float, bool, str, Path) else str
 
     def explained(self, info: FieldInfo) -> str:
         """Return the help with the default."""
@@ -106,38 +120,16 @@ class Option:
         is_shown = isinstance(default, int | float | str) and not isinstance(default, bool) and default != ""
         if not is_shown or not self.help or "[" in self.help:
             return self.help
-        return f"{self.help.removesuffix('.')} [{default:g}]." if isinstance(default, float) else (
-            f"{self.help.removesuffix('.')} [{default}]."
-        )  # fmt: skip
-
-
-def _is_path(kind: Any) -> bool:
-    from pathlib import Path
-
-    return kind is Path
+        shown = f"{default:g}" if isinstance(default, float) else default
+        return f"{self.help.removesuffix('.')} [{shown}]."
 
 
 def option(
-    default: Any = None,
-    help: str = "",
-    *,
-    name: str = "",
-    negative: str = "",
-    letter: str = "",
-    unit: str = "",
-    takes: Any = None,
-    parse: Callable[[Any], Any] | None = None,
-    choices: str = "",
-    entry: str = "",
-    entries: Mapping[str, str] | None = None,
-    of: type[BaseModel] | None = None,
-    renamed: Mapping[str, str] | None = None,
-    group: str = "",
-    default_factory: Callable[[], Any] | None = None,
-    is_argument: bool = False,
-    **limits: Any,
+    default: Any = None, help: str = "", *, default_factory: Callable[[], Any] | None = None, **more: Any
 ) -> Any:
-    """Declare a setting that is an option of the command line; ``limits`` are those of pydantic's ``Field``.
+    """Declare a setting that is an option of the command line.
+
+    ``more`` are fields of `Option`, and the limits of its values, which are those of pydantic's ``Field``.
 
     Examples
     --------
@@ -146,29 +138,47 @@ def option(
     >>> Throw().draws, [option.explained(info) for _, option, info in options_of(Throw)]
     (64, ['Number of draws [64].'])
     """
-    declared = Option(
-        help,
-        name,
-        negative,
-        letter,
-        unit,
-        takes,
-        parse,
-        choices,
-        entry,
-        entries or {},
-        of,
-        renamed or {},
-        group,
-        is_argument,
-    )
+    declared = {name: more.pop(name) for name in [entry.name for entry in fields(Option)] if name in more}
     start = {"default": default} if default_factory is None else {"default_factory": default_factory}
-    return Field(**start, description=help or None, json_schema_extra=declared, **limits)
+    return Field(**start, description=help or None, json_schema_extra=Option(help, **declared), **more)
 
 
 def argument(default: Any, help: str, **more: Any) -> Any:
     """Declare a setting that is typed without its name; the arguments are those of `option`."""
     return option(default, help, is_argument=True, **more)
+
+
+def seed() -> Any:
+    """Declare the seed of random numbers."""
+    return option(0, "Seed of the random numbers.", ge=0, le=MAX_SEED)
+
+
+def only_rows(group: str = "") -> Any:
+    """Declare the rows of a file that are read: those of one specimen."""
+    return option(
+        default_factory=dict,
+        group=group,
+        help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat.",
+        parse=pairs_of("--only", "a choice of rows", "COLUMN=VALUE, such as Specimen=S1", divided_last=True),
+    )
+
+
+def sampling() -> Any:
+    """Declare how draws spread through a posterior."""
+    return option(
+        "sobol", "How draws spread: sobol, latin or random.", choices="tissuq.posterior.drawn_materials:Sampling"
+    )
+
+
+def mesh_order(group: str) -> Any:
+    """Declare the order with which what is computed on a finer mesh converges."""
+    return option(
+        None,
+        "Power of the size of elements with which the error of the mesh falls: 1 at sharp edges, 2 without [1].",
+        gt=0,
+        le=8,
+        group=group,
+    )
 
 
 def options_of(kind: type[BaseModel]) -> Iterator[tuple[str, Option, FieldInfo]]:

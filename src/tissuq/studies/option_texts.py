@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, fields
+from math import isnan, nan
 from typing import Any
 
 from tissuq.errors import InputError
@@ -89,16 +90,19 @@ def share(option: str) -> Callable[[str], float]:
     """Return what makes a number of a text like 10% or 0.1."""
 
     def parse(text: str) -> float:
-        scale = 0.01 if text.strip().endswith("%") else 1.0
-        try:
-            number = float(text.strip().removesuffix("%"))
-        except ValueError as error:
-            raise InputError(f"{option} needs a share such as 10% or 0.1, not '{text}'.") from error
-        if scale == 1.0 and number > 1.0:  # whoever writes 10 means 10 %
+        number, is_percent = _number_or_percent(text)
+        if isnan(number) or (number > 1.0 and not is_percent):  # whoever writes 10 means 10 %
             raise InputError(f"{option} needs a share such as 10% or 0.1, not '{text}'.")
-        return scale * number
+        return number
 
     return parse
+
+
+def _number_or_percent(text: str) -> tuple[float, bool]:
+    """Return the number of a text like 10% or 0.1, nan where it is none, and whether it is in percent."""
+    is_percent = text.strip().endswith("%")
+    number = number_or_text(text.strip().removesuffix("%"))
+    return nan if isinstance(number, str) else number * (0.01 if is_percent else 1.0), is_percent
 
 
 def range_of(option: str, example: str) -> Callable[[str], tuple[float, float]]:
@@ -148,14 +152,10 @@ def _tolerance(text: str) -> tuple[str, float]:
     from tissuq.model.measurement_errors import measurement_errors
 
     name, _, number = text.partition("=")
-    scale = 0.01 if number.strip().endswith("%") else 1.0
-    try:
-        value = float(number.strip().removesuffix("%")) * scale
-    except ValueError:
-        value = -1.0
+    value, is_percent = _number_or_percent(number)
     name, errors = name.strip(), measurement_errors()
     is_share = name not in errors or not errors[name].is_stress
-    if name not in errors or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
+    if name not in errors or not value >= 0 or (is_share and value > 1) or (not is_share and is_percent):
         names = ", ".join(errors)
         raise InputError(
             f"'{text}' is not a tolerance; write stress=10%, length=2%, slack=0.01, smooth=2%, zero=0.1 or "

@@ -40,7 +40,6 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         ...,
         "Files, a specimen each; or folders of them, in which a folder is a specimen with a file a test.",
         takes=list[Path],
-        parse=lambda paths: tuple(map(str, paths)),
         min_length=1,
     )
     specimen: str | None = option(None, "Column of a single file that names the specimens.", name="specimen-column")
@@ -53,7 +52,6 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         "Table of what is known of the specimens: their names in the first column, then one each for age, sex and the "
         "like, with names; 'age [year]' states a unit.",
         takes=Path,
-        parse=str,
         group=COVARIATES,
     )
     covariate: tuple[str, ...] = option(
@@ -86,7 +84,6 @@ class PopulationSettings(FittedSettings, ReadingSettings):
     without: tuple[str, ...] = option(
         (), "Specimen to leave out, by its name in the table of specimens; repeat for more."
     )
-    mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
 
     def sources(self, folder: Path = Path()) -> dict[str, list[Path]]:
         """Return the files of every specimen; one file alone where a column in it names them."""

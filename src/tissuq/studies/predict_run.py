@@ -22,7 +22,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
 from tissuq.studies.prediction import Prediction, calibrated_points, range_of
-from tissuq.studies.prediction_settings import POINTS, PredictionSettings
+from tissuq.studies.run_settings import POINTS, PredictionSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -274,12 +274,8 @@ def run_prediction(
     step("reading")
     mode = settings.mode_in(folder, law)
     options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}
-    options |= {"mode": mode, "stretch": settings.points_of(mode), "data": _data(settings, mode, folder)}
+    options |= {"mode": mode, "stretch": settings.points_of(mode)}
+    if settings.data is not None:
+        options["data"] = settings.data.model_copy(update={"mode": mode}).experiment(folder)
     step("predicting")
     return predict_run(folder / settings.run, settings.discrepancy, settings.law_of(law), **options)
-
-
-def _data(settings: PredictionSettings, mode: str, folder: Path) -> Experiment | None:
-    if settings.data is None:
-        return None
-    return settings.data.model_copy(update={"mode": mode}).experiment(folder)

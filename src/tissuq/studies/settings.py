@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 __all__ = [
-    "DAMAGE", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "is_inside", "load_settings", "looked_up",
-    "positive_or_unknown", "setting_of", "there_is",
+    "DAMAGE", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
+    "looked_up", "positive_or_unknown", "setting_of", "there_is",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
@@ -166,15 +167,26 @@ def looked_up(find: Callable[[Any], Named], name: Any) -> Named:
         raise ValueError(str(error)) from error
 
 
-def there_is(find: Callable[[Any], object]) -> Callable[[Any], Any]:
-    """Return a validator of a name, or of several: each must be one that ``find`` knows, as of `looked_up`."""
+def there_is(find: Callable[[Any], object] | str) -> Callable[[Any], Any]:
+    """Return a validator of a name, or of several, unless it is None: each must be one that ``find`` knows.
+
+    Where that is MODULE:NAME, it is imported when a value is checked.
+    """
 
     def check(value: Any) -> Any:
+        known = imported(find) if isinstance(find, str) else find
         for name in value if isinstance(value, tuple) else (value,):
-            looked_up(find, name)
+            if name is not None:
+                looked_up(known, name)
         return value
 
     return check
+
+
+def imported(location: str) -> Any:
+    """Return what MODULE:NAME is."""
+    module, _, name = location.partition(":")
+    return getattr(import_module(module), name)
 
 
 def _errors_there_are(sizes: dict[str, float] | None) -> dict[str, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import fields
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +13,10 @@ from pydantic import field_validator, model_validator
 
 from tissuq.errors import InputError
 from tissuq.registry import find
-from tissuq.studies.option import option
+from tissuq.studies.option import mesh_order, option, seed
 from tissuq.studies.option_texts import number_or_text, pairs_of
-from tissuq.studies.settings import looked_up
-from tissuq.studies.shared_options import RunSettings, mesh_order, seed
+from tissuq.studies.run_settings import RunSettings
+from tissuq.studies.settings import imported, there_is
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
@@ -30,12 +31,6 @@ MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
 OF_BODY = ("move", "press", "tip_radius", "inflate", "watch", "shape", "parts", "finer_mesh", "mesh_order")
 """Options, besides the sets that are held, that say nothing without a mesh."""
 LOADS = {"move": MOVEMENT, "press": MOVEMENT, "inflate": re.compile(f"(?P<set>.+)={NUMBER}", re.IGNORECASE)}
-
-
-def _bulk_ratio() -> float:
-    from tissuq.finite_elements.response import BULK_RATIO
-
-    return BULK_RATIO
 
 
 class SimulationSettings(RunSettings):
@@ -71,12 +66,15 @@ class SimulationSettings(RunSettings):
         lt=inf,
     )
     bulk_ratio: float = option(
-        help="Bulk modulus in initial shear moduli [2000].", default_factory=_bulk_ratio, gt=0, lt=inf
+        help="Bulk modulus in initial shear moduli [2000].",
+        default_factory=partial(imported, "tissuq.finite_elements.response:BULK_RATIO"),
+        gt=0,
+        lt=inf,
     )
 
     mesh: str | None = option(
         None, "Instead of a case: a file of a mesh (.msh, .inp, .vtu and others that meshio reads; in mm).",
-        takes=Path, parse=str, group=BODY,
+        takes=Path, group=BODY,
     )  # fmt: skip
     hold: dict[str, str] = option(
         default_factory=dict,
@@ -105,7 +103,7 @@ class SimulationSettings(RunSettings):
     shape: str | None = option(None, "axisymmetric (around y) or plane (strain), of a mesh in a plane.", group=BODY)
     finer_mesh: str | None = option(
         None, "The same body with smaller cells: one draw is computed on it, too, for the error of the mesh.",
-        takes=Path, parse=str, group=BODY,
+        takes=Path, group=BODY,
     )  # fmt: skip
     mesh_order: float | None = mesh_order(BODY)
     parts: float = option(1.0, "Such bodies, by symmetry, that bear the force side by side.", gt=0, lt=inf, group=BODY)
@@ -120,13 +118,7 @@ class SimulationSettings(RunSettings):
             return {**values, "case": values.get("case") or USUAL_CASE}
         return {**values, "case": None if values.get("case") == USUAL_CASE else values.get("case")}
 
-    @field_validator("bulk_ratio")
-    @classmethod
-    def _nearly_incompressible(cls, ratio: float) -> float:
-        from tissuq.finite_elements.solver import check_bulk_ratio
-
-        looked_up(check_bulk_ratio, ratio)
-        return ratio
+    _nearly_incompressible = field_validator("bulk_ratio")(there_is("tissuq.finite_elements.solver:check_bulk_ratio"))
 
     def sized_case(self, beside: Path = Path()) -> Case:
         """Return the case with its sizes, or the body of a mesh that lies beside a recipe.

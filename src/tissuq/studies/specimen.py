@@ -36,16 +36,9 @@ from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.specimen_settings import ALL, SpecimenSettings
 
 __all__ = [
-    "ALL",
-    "SpecimenSettings",
-    "SpecimenStudy",
-    "fitted",
-    "parameters_of",
-    "priors_in_mpa",
-    "run_specimen",
-    "steps_of",
+    "SpecimenSettings", "SpecimenStudy", "fitted", "priors_in_mpa", "run_specimen", "shared_options", "steps_of",
     "warnings_of_files",
-]
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -193,7 +186,8 @@ def run_specimen(
             skipped[f"{name}, each test predicted from the others"] = str(error)
             continue
         held_out += [
-            {"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in predictions
+            {"formulation": name} | {str(key): None if value != value else value for key, value in row.items()}
+            for row in predictions
         ]
     results = settings, experiment, posteriors, seconds, skipped, assessments, read_warnings
     return SpecimenStudy(*results, tuple(held_out))
@@ -220,11 +214,6 @@ def fitted(
     return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
 
 
-def _known(value: Any) -> Any:
-    """Return a value, None for one that is no number."""
-    return None if value != value else value
-
-
 def _options(
     settings: SpecimenSettings,
     material: Material,
@@ -234,15 +223,14 @@ def _options(
 ) -> dict[str, Any]:
     """Return the options of a fit but the discrepancy."""
     parameter_names = {p.symbol for p in parameters}
-    return {
-        "material": material,
-        "noise": settings.noise_in(unit),
-        "priors": {symbol: prior for symbol, prior in priors.items() if symbol in parameter_names},
-        "tolerances": settings.tolerances_in(unit),
-        "method": settings.method,
-        "stable_in": settings.stable_in,
-        "seed": settings.seed,
-    }
+    of_fit = {symbol: prior for symbol, prior in priors.items() if symbol in parameter_names}
+    return {"material": material, "priors": of_fit, **shared_options(settings, unit)}
+
+
+def shared_options(settings: SpecimenSettings, unit: StressUnit) -> dict[str, Any]:
+    """Return the options of a fit that do not depend on material and discrepancy."""
+    stated = {name: getattr(settings, name) for name in ("method", "stable_in", "seed")}
+    return {"noise": settings.noise_in(unit), "tolerances": settings.tolerances_in(unit), **stated}
 
 
 def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:

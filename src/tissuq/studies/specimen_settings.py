@@ -61,11 +61,6 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         takes=str,
         parse=noises,
     )
-    noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
-        None,
-        "Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
-        "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again).",
-    )
     priors: dict[str, dict[str, float | str]] = option(
         help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more.",
         default_factory=dict,
@@ -75,7 +70,6 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     mode: str | None = option(
         None, "Loading mode [uniaxial]; once for each of several files [as they or their names say].", takes=list[str]
     )
-    method: str = option("auto", "auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method")
     stable_in: tuple[str, ...] = option((), "Require stability in this loading mode, or in all; repeat for more.")
     held_out: bool = option(False, "Also predict each of several tests from the others.")
 

@@ -1,25 +1,55 @@
-"""The settings of a prediction as texts and files, and what they mean."""
+"""What is done with a run of ``tissuq fit``: the settings of a prediction and of a ranking of tests."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from pydantic import Field
+
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import MeasuredFile, ReadingSettings
-from tissuq.studies.option import option
-from tissuq.studies.shared_options import RunSettings
+from tissuq.studies.option import Settings, argument, option, seed
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from tissuq.mechanics import Material
+    from tissuq.next_test.candidates import Candidate
 
-__all__ = ["POINTS", "ComparedFile", "PredictionSettings", "stretches"]
+__all__ = [
+    "POINTS",
+    "CandidateSettings",
+    "ComparedFile",
+    "DesignSettings",
+    "PredictionSettings",
+    "RunSettings",
+    "stretches",
+]
 
 POINTS = 101
 """Number of stretches of a band by default."""
+
+
+class RunSettings(Settings):
+    """What is done with a run of ``tissuq fit``."""
+
+    run: str = argument(..., "Run folder of tissuq fit.", takes=Path)
+    material: str | None = option(None, "Which of the laws of the run, where it compared several.")
+    discrepancy: str | None = option(None, "Which of the discrepancies of the run [auto, or the only one].")
+
+    def law_of(self, own: Material | None) -> str | Material | None:
+        """Return the law of the run: the user's own, which was named beside the settings, or the name of another.
+
+        Raises
+        ------
+        InputError
+            When these are two.
+        """
+        if own is not None and self.material not in (None, own.name):
+            raise InputError(f"--user-law names the law '{own.name}', and --material '{self.material}': give one law.")
+        return own or self.material
 
 
 class ComparedFile(MeasuredFile):
@@ -110,6 +140,55 @@ class PredictionSettings(RunSettings):
                 "for an axis that is held."
             )
         return np.column_stack([axis1, axis2])
+
+
+class CandidateSettings(Settings):
+    """A test that could be made, at any stretches."""
+
+    mode: str
+    stretch: tuple[float, ...] = Field(min_length=1)
+    name: str = ""
+
+
+class DesignSettings(RunSettings):
+    """Everything that a ranking of tests depends on."""
+
+    targets: tuple[str, ...] = option(
+        ("modulus",),
+        "Quantity to become less uncertain: modulus (initial shear modulus), a parameter, a stress as MODE:STRETCH, "
+        "such as planar:1.5, or a quantity of your model as ensemble:FOLDER:NAME; repeat for more [modulus].",
+        name="target",
+        min_length=1,
+    )
+    candidates: tuple[str | CandidateSettings, ...] = option(
+        (),
+        "A test as 'MODE LOW:HIGH POINTS', such as 'planar 1:1.5 20'; repeat for more [every mode of one stretch, in "
+        "several ranges].",
+        name="candidate",
+    )
+    points: tuple[int, ...] = option(
+        (),
+        "Measurements of every default test; repeat for more [as many as the data, 10 to 40].",
+        name="measurements",
+    )
+    specimen: Literal["same", "other"] | None = option(
+        None,
+        "The next test is of the same specimen or of another one [other where the fit has errors of tests, else same].",
+        name="next-specimen",
+    )
+    seed: int = seed()
+
+    @property
+    def tests(self) -> list[Candidate]:
+        """The candidates; empty for the default ones."""
+        from tissuq.next_test.candidates import Candidate, candidate_named
+
+        return [
+            candidate_named(candidate)
+            if isinstance(candidate, str)
+            else Candidate(candidate.mode, candidate.stretch, candidate.name)
+            for candidate in self.candidates
+        ]
 
 
 def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
