@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["LARGE_STRETCH", "check_no_percent", "checked", "checked_points", "in_mpa"]
+__all__ = ["LARGE_STRETCH", "check_no_percent", "checked", "checked_points", "in_mpa", "stress_in_mpa"]
 
 FloatArray = NDArray[np.float64]
 
@@ -56,6 +57,29 @@ def in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
         return _magnitude(stress, "megapascal"), stress_unit_of(unit or unit_of(stress)).name
     shown = stress_unit_of(unit or "MPa")
     return _numbers("stress", stress) * shown.to_mpa, shown.name
+
+
+def stress_in_mpa(stress: Any) -> Any:
+    """Return a stress in MPa that is a text with its unit or a quantity of pint; anything else as it is.
+
+    Raises
+    ------
+    InputError
+        When a text is a number without a unit, or its unit or that of a quantity is none of stress.
+
+    Examples
+    --------
+    >>> stress_in_mpa("0.02 kPa"), stress_in_mpa(0.5), stress_in_mpa("unknown")
+    (2e-05, 0.5, 'unknown')
+    """
+    if is_quantity(stress):
+        return stress.magnitude * stress_unit_of(unit_of(stress)).to_mpa
+    number, unit = number_and_unit(stress) if isinstance(stress, str) else (None, "")
+    if number is None:
+        return stress
+    if not unit:
+        raise InputError(f"'{stress}' has no unit: write it with one, such as '{stress} kPa', or as a number of MPa.")
+    return number * stress_unit_of(unit).to_mpa
 
 
 def _magnitude(values: Any, unit: str) -> Any:

@@ -16,13 +16,13 @@ from tissuq.experiments.reading.recognition import (
     LENGTHENINGS,
     LOADS,
     OTHER_MEASURE,
+    PRESSURE,
     SHEARS,
     ColumnChoice,
     Contents,
     say_which,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.tube_columns import PRESSURE
 from tissuq.experiments.units import measured_in
 
 __all__ = [

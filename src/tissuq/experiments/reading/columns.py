@@ -42,9 +42,9 @@ from tissuq.experiments.reading.recognition import (
     columns_there_are,
     recognise,
     told_by_unit,
+    with_columns_of_tube,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.tube_columns import with_columns_of_tube
 from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 

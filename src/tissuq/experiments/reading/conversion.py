@@ -14,16 +14,14 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import about_stress, mapping_of_each_stress
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions
-from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimensions_of_stresses
-from tissuq.experiments.reading.height_of_block import of_block
-from tissuq.experiments.reading.labels import columns_only
+from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimensions_of_stresses, of_block
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.repeated_sizes import test_beside
-from tissuq.experiments.reading.several_specimens import check_one_specimen
+from tissuq.experiments.reading.rows_of_tests import check_one_specimen, columns_only
+from tissuq.experiments.reading.side_by_side import test_beside
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.table import Column, Table

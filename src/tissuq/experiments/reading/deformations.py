@@ -22,9 +22,8 @@ from tissuq.experiments.reading.plausibility import (
     check_positions,
     check_strain,
 )
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import DIAMETERS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.tube_columns import DIAMETERS
 from tissuq.experiments.units import ANGLE, FORCE, LENGTH, PIXELS, RATE, TIME, Quantity, measured_in
 
 __all__ = ["stretch_of", "without_machine"]

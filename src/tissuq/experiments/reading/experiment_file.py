@@ -26,10 +26,9 @@ from tissuq.experiments.reading.conversion import (
 )
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
-from tissuq.experiments.reading.labels import check_labels, columns_only, labels_of
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.plausibility import check_stretches
+from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.regions import (
     AUTO,
@@ -40,8 +39,11 @@ from tissuq.experiments.reading.regions import (
     slack_error,
     tested_stresses,
 )
-from tissuq.experiments.reading.several_specimens import (
+from tissuq.experiments.reading.rows_of_tests import (
     SeveralSpecimens,
+    check_labels,
+    columns_only,
+    labels_of,
     only_rows,
     specimen_of,
 )
@@ -57,7 +59,6 @@ from tissuq.experiments.reading.stated_mode import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
-from tissuq.experiments.reading.volume import volume_step
 
 __all__ = [
     "Reading",

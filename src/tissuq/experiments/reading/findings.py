@@ -17,12 +17,12 @@ from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.load_cell import scatter_of_neighbours
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.reading.regions import Region
-from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
+from tissuq.experiments.reading.rows_of_tests import advice_on_numbered_tests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import ROLES
-from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.experiments.reading.arrangement import names_above
 from tissuq.experiments.reading.headings import (
     AXES,
     is_of_mean,
@@ -16,13 +17,12 @@ from tissuq.experiments.reading.headings import (
     role_names,
     without_mean,
 )
-from tissuq.experiments.reading.lines_above import names_above
-from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.vocabulary import other_quantity
 from tissuq.experiments.units import measured_in
 
-__all__ = ["ColumnsOfTest", "columns_named_again", "columns_side_by_side"]
+__all__ = ["ColumnsOfTest", "TestBeside", "columns_named_again", "columns_side_by_side", "test_beside"]
 
 PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
 """Words and capacities that tell one load cell from another, and not tests."""
@@ -39,6 +39,25 @@ class ColumnsOfTest(NamedTuple):
 
     name: str
     columns: Mapping[str, str | int]
+
+
+class TestBeside(NamedTuple):
+    """One of several tests side by side in a table: its name, its column of loads, and those of all tests."""
+
+    name: str
+    load: int
+    names: Sequence[str]
+    loads: Sequence[int]
+
+    @property
+    def number(self) -> str:
+        """The digits in its name."""
+        return re.sub(r"\D", "", self.name)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Those in the names of all tests."""
+        return [re.sub(r"\D", "", name) for name in self.names]
 
 
 class _Role(NamedTuple):
@@ -82,6 +101,16 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
         ColumnsOfTest(name, {measure: deformation + 1, load: stress + 1})
         for name, (deformation, stress) in zip(names, pairs, strict=True)
     ]
+
+
+def test_beside(table: Table, load: int, stress_type: str | None, *, is_shear: bool) -> TestBeside | None:
+    """Return which of several tests in a table has a column of loads; None where the table holds one test."""
+    tests = columns_side_by_side(table, stress_type, is_shear=is_shear)
+    loads = [int(column) - 1 for test in tests for column in [*test.columns.values()][1:]]
+    if load not in loads:
+        return None
+    names = [test.name for test in tests]
+    return TestBeside(names[loads.index(load)], load, names, loads)
 
 
 def columns_named_again(table: Table, columns: Mapping[str, str | int]) -> list[ColumnsOfTest]:

@@ -6,16 +6,17 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import prod
+from typing import NamedTuple
 
 from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
+from tissuq.experiments.reading.arrangement import names_above
 from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
-from tissuq.experiments.reading.lines_above import names_above
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, are_named, numbered, sizes_in_line
+from tissuq.experiments.reading.side_by_side import TestBeside
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
-from tissuq.experiments.units import AREA, LENGTH, Quantity
+from tissuq.experiments.units import AREA, LENGTH, Quantity, looks_like_unit
 
 __all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "stated_sizes"]
 
@@ -43,6 +44,13 @@ NAMES_OF_SIDES = {"l": "length", "b": "width", "w": "width", "h": "thickness", "
 """Symbols of the sides of a specimen in a product, as in ``b x h: 5 x 2 mm``."""
 LONGEST_QUOTE = 60
 """Characters of a line that a message shows."""
+
+NUMBERED = re.compile(
+    r"(?P<name>[^\d]*[^\W\d]{2}[^\d]*?)[\s_]*(?:(?:[#№]|\bn[or]\.?)\s*)?(?P<number>[1-9])\s*(?P<unit>[\[(][^\])]*[\])])?"
+)
+"""As in ``Width 2 (mm)`` and ``Thickness #1``; two letters at least, so not ``L0``."""
+LONGEST_NAME = 80
+"""Characters of the name of a size."""
 
 
 @dataclass(frozen=True)
@@ -272,3 +280,89 @@ def _sizes(name: Heading, text: str, source: str, shown: str) -> list[StatedSize
         if number and number > 0 and factor:
             return [StatedSize(name.quantity, kind, number * factor, source, shown)]
     return []
+
+
+class Place(NamedTuple):
+    """A value in a line, and the column from which on what stands beneath it belongs to it."""
+
+    text: str
+    column: int
+
+
+class SizesInLine(NamedTuple):
+    """Values of one size in a line, in their order, under its name, with its unit."""
+
+    name: str
+    values: list[Place]
+
+    def over(self, test: TestBeside) -> str | None:
+        """Return the value over the columns of a test; None where not every test has one, and every value a test."""
+        owners = [sum(value.column <= load for value in self.values) - 1 for load in test.loads]
+        if sorted(owners) != list(range(len(self.values))):
+            return None
+        return self.values[owners[test.loads.index(test.load)]].text
+
+
+def numbered(name: str) -> tuple[str, str]:
+    """Return the name of a size without the number of its measurement, and that number; others as they are.
+
+    Examples
+    --------
+    >>> numbered("Width 2 (mm)"), numbered("Thickness #1"), numbered("thickness 3"), numbered("L0"), numbered("Step 2")
+    (('Width (mm)', '2'), ('Thickness', '1'), ('thickness', '3'), ('L0', ''), ('Step 2', ''))
+    """
+    match = NUMBERED.fullmatch(name.strip()) if len(name) <= LONGEST_NAME else None
+    if match and dimensions_named(plain(match["name"]), is_cylinder=True):
+        return " ".join(filter(None, (match["name"].strip(), match["unit"]))), match["number"]
+    return name, ""
+
+
+def are_named(sizes: SizesInLine, table: Table) -> bool:
+    """Tell whether another line above a table names what stands in the columns of values, as those of specimens."""
+    columns = [value.column for value in sizes.values]
+    for _, text in table.head:
+        cells = split(text, table.separator)
+        if set(table.names) & {*cells} - {""}:
+            continue
+        over = [cells[column] for column in columns if column < len(cells)]
+        label = heading(cells[0]).quantity if cells else ""
+        if is_of_specimens(label) and sum(map(bool, over)) > 1:
+            return True
+        words = [cell for cell in over if cell and number_and_unit(cell)[0] is None and not looks_like_unit(cell)]
+        if len(words) > 1 and len(set(columns)) > 1:
+            return True
+    return False
+
+
+def sizes_in_line(text: str, separator: str) -> list[SizesInLine]:
+    """Return the sizes of which a line states more than one value, each in a cell."""
+    if separator == WHITESPACE:
+        return _after_words(text)
+    label, of_label = "", -1
+    values, labels = dict[str, list[tuple[str, int, int]]](), list[str]()
+    cells = enumerate(split(text, separator))
+    words = ((column, word.strip()) for column, cell in cells for word in re.split("[:=]", cell))
+    for column, word in words:
+        is_value = number_and_unit(word)[0] is not None
+        if is_value and label:
+            values.setdefault(label, []).append((word, column, of_label))
+            of_label = column + 1
+        elif word and not is_value and not looks_like_unit(word):
+            label = word if dimensions_named(heading(word).quantity, is_cylinder=True) else ""
+            of_label = column
+            labels.append(label)
+    several = {name: cells for name, cells in values.items() if len(cells) > 1}
+    return [
+        SizesInLine(name, [Place(cell, start if labels.count(name) > 1 else column) for cell, column, start in cells])
+        for name, cells in several.items()
+    ]
+
+
+def _after_words(text: str) -> list[SizesInLine]:
+    """Return the values at the end of a line without cells; where they belong is not told by their columns."""
+    words = text.split()
+    count = next((k for k, word in enumerate(reversed(words)) if not NUMBER.fullmatch(word)), len(words))
+    name = " ".join(words[: len(words) - count]).rstrip(" :=")
+    if count < 2 or not dimensions_named(heading(name).quantity, is_cylinder=True):
+        return []
+    return [SizesInLine(name, [Place(number, 0) for number in words[-count:]])]

@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.arrangement import blocks_of, joined_where_they_go_on, transposed_table
+from tissuq.experiments.reading.arrangement import (
+    blocks_of,
+    joined_where_they_go_on,
+    number_before,
+    title_of,
+    transposed_table,
+    with_names_above,
+)
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.layout import (
@@ -27,11 +34,9 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
-from tissuq.experiments.reading.lines_above import number_before, title_of, with_names_above
-from tissuq.experiments.reading.no_measurements import without_statements_beside, without_summary
+from tissuq.experiments.reading.plain_tables import with_plain_numbers, without_statements_beside, without_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
-from tissuq.experiments.reading.written_numbers import with_plain_numbers
 
 __all__ = ["read_table", "read_tables"]
 

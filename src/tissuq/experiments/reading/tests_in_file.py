@@ -20,10 +20,9 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
-from tissuq.experiments.reading.labels import check_labels, columns_only
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows, row_names
+from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, check_labels, columns_only, only_rows, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
