@@ -21,15 +21,9 @@ from tissuq.experiments.reading.column_checks import (
 from tissuq.experiments.reading.headings import (
     AXES,
     COMPONENTS,
-    measure_in,
-    of_spread,
+    contents_of,
     on_axis,
     plain,
-    role_names,
-    stretches_less_one,
-    without_correction,
-    without_gradient,
-    without_mean,
 )
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -45,7 +39,7 @@ from tissuq.experiments.reading.recognition import (
     with_columns_of_tube,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT
+from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
 __all__ = [
@@ -155,7 +149,7 @@ def _with_numbered_second(table: Table) -> dict[str, str | int]:
     columns: dict[str, str | int] = {}
     names = [on_axis(name) for name, _ in _names(table)]
     for column, (axis, name) in enumerate(names, start=1):
-        role = next((role for role in (*DEFORMATIONS, *LOADS) if name in role_names(role)), "")
+        role = next((role for role in (*DEFORMATIONS, *LOADS) if name in ROLES[role]), "")
         numbered = role + "2" * (axis == "y")
         if role and (axis == "x" or numbered in columns):
             return {}
@@ -173,30 +167,8 @@ def _axes_of(table: Table) -> list[str]:
 
 
 def _names(table: Table) -> list[tuple[str, str]]:
-    """Return what the columns' names say they hold, and the measure of strain or stress; empty texts of spreads.
-
-    Beside columns of a spread without words for a mean.
-    """
-    quantities = table.quantities
-    is_less_one = stretches_less_one(table.names)
-    quantities = ["strain" if less_one else name for name, less_one in zip(quantities, is_less_one, strict=True)]
-    quantities = _corrected_alone(quantities)
-    is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]
-    quantities = [without_gradient(name) if ratio else name for name, ratio in zip(quantities, is_ratio, strict=True)]
-    is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]
-    if any(is_spread):
-        quantities = [without_mean(quantity) or quantity for quantity in quantities]
-    return [("", "") if of_spread else measure_in(name) for name, of_spread in zip(quantities, is_spread, strict=True)]
-
-
-def _corrected_alone(quantities: Sequence[str]) -> list[str]:
-    """Return what columns hold, of those that stand there with and without a correction only the corrected ones."""
-    plain_names = [without_correction(quantity) for quantity in quantities]
-    corrected = {name for name, quantity in zip(plain_names, quantities, strict=True) if name != quantity}
-    return [
-        "" if name == quantity and quantity in corrected else name
-        for name, quantity in zip(plain_names, quantities, strict=True)
-    ]
+    """Return what the columns' names say they hold, and the measure of strain or stress."""
+    return contents_of(table.names, [table.unit(column) for column in range(len(table.names))])
 
 
 def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
@@ -255,7 +227,7 @@ def _choice(
         else:
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
-            measure = next((measure for measure in measures if name in role_names(measure)), "strain")
+            measure = next((measure for measure in measures if name in ROLES[measure]), "strain")
             if is_shear and measure == "stretch":
                 check_is_shear(table, deformation)
                 unnamed |= {deformation}
@@ -290,7 +262,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
             f"{table.file} has no columns of an axis '{axis}'. {columns_there_are(table)} Leave axis (--axis) out."
         )
     if axis is None and len(axes) == 2 and not mapping:
-        loaded = {axis_of_load for axis_of_load, name in names if any(name in role_names(role) for role in LOADS)}
+        loaded = {axis_of_load for axis_of_load, name in names if any(name in ROLES[role] for role in LOADS)}
         if len(loaded & {*axes}) == 1:
             (only,) = loaded & {*axes}
             raise InputError(
@@ -319,7 +291,7 @@ def _without_empty(table: Table, names: Sequence[tuple[str, str]]) -> list[tuple
 
     An axis that is held at its length while the load along it changes (a strip test) keeps its deformation.
     """
-    deformations, loads = (frozenset().union(*map(role_names, roles)) for roles in (DEFORMATIONS, LOADS))
+    deformations, loads = (frozenset().union(*(ROLES[role] for role in roles)) for roles in (DEFORMATIONS, LOADS))
     filled = list(names)
     is_loaded = {axis for column, (axis, name) in enumerate(names) if name in loads and not table.is_constant(column)}
     for kind in (deformations, loads):

@@ -24,9 +24,8 @@ from tissuq.experiments.reading.conversion import (
     stress_measure_of,
     with_engineering_stress,
 )
-from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
-from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles, of_cycle
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from tissuq.experiments.checked_arrays import LARGE_STRETCH
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
-from tissuq.experiments.reading.cycles import Cycle
+from tissuq.experiments.reading.disturbances import scatter_of_neighbours
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
-from tissuq.experiments.reading.load_cell import scatter_of_neighbours
-from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.measured_rows import Cycle, labelled
 from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.rows_of_tests import advice_on_numbered_tests

@@ -10,10 +10,10 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Planar
-from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, role_names
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES_OF_TUBE, other_quantity
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES, ROLES_OF_TUBE, other_quantity
 from tissuq.experiments.units import measured_in
 
 __all__ = [
@@ -113,7 +113,7 @@ class Contents:
 
         That is the one asked for, or else the engineering one, or what does not say another.
         """
-        names = frozenset().union(*(role_names(role) for role in roles))
+        names = frozenset().union(*(ROLES[role] for role in roles))
         if "stress" in roles and self.stress_type is not None:
             names |= STRESS_NOUNS | COMPONENTS["stress"]
         if "strain" in roles and self.strain_type is not None:
@@ -147,7 +147,7 @@ def told_by_unit(
         if len(columns) == 1 and (load is None or rivals == columns or kind == "angle"):
             name = contents.quantities[columns[0]]
             is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
-            return None if is_open or name in role_names("shear") else (kind, columns[0])
+            return None if is_open or name in ROLES["shear"] else (kind, columns[0])
     return None
 
 
@@ -216,7 +216,7 @@ def _of_other_quantities(table: Table, roles: Sequence[str]) -> str:
 
 def _stress_hint(table: Table, contents: Contents) -> str:
     for column, quantity in enumerate(contents.quantities):
-        if quantity in role_names("torque"):
+        if quantity in ROLES["torque"]:
             return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
         if IS_PRESSURE.search(quantity):
             return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
@@ -296,7 +296,7 @@ def with_columns_of_tube(
         return dict(mapping)
     by_role = {role: columns for role in ROLES_OF_TUBE if (columns := list(_columns_of_tube(table, quantities, role)))}
     has_both = PRESSURE in by_role and not by_role.keys().isdisjoint(DIAMETERS)
-    if not tube_roles and (not has_both or not role_names("stress").isdisjoint(quantities)):
+    if not tube_roles and (not has_both or not ROLES["stress"].isdisjoint(quantities)):
         return dict(mapping)
     if other_roles:
         raise InputError(
@@ -322,7 +322,7 @@ def with_columns_of_tube(
 
 def _columns_of_tube(table: Table, quantities: Sequence[str], role: str) -> Iterator[int]:
     """Yield the columns that change and whose names have a role, or whose unit is one of pressures alone."""
-    names = role_names(role)
+    names = ROLES[role]
     is_named = any(quantity in names for quantity in quantities)
     for column, quantity in enumerate(quantities):
         is_one = quantity in names if is_named or role != PRESSURE else measured_in(table.unit(column)) == PRESSURE

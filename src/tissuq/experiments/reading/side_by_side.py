@@ -14,12 +14,11 @@ from tissuq.experiments.reading.headings import (
     measure_in,
     of_spread,
     on_lettered_axis,
-    role_names,
     without_mean,
 )
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import other_quantity
+from tissuq.experiments.reading.vocabulary import ROLES, other_quantity
 from tissuq.experiments.units import measured_in
 
 __all__ = ["ColumnsOfTest", "TestBeside", "columns_named_again", "columns_side_by_side", "test_beside"]
@@ -147,7 +146,7 @@ def _role(quantity: str, roles: Sequence[str], stress_type: str | None) -> _Role
         quantity_alone, measure = measure_in(words)
         for role in roles:
             wanted = stress_type if role == "stress" else None
-            if quantity_alone in role_names(role) and measure in ("", wanted or "engineering"):
+            if quantity_alone in ROLES[role] and measure in ("", wanted or "engineering"):
                 return _Role(role, test)
     return _Role("", "")
 

@@ -6,7 +6,6 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import prod
-from typing import NamedTuple
 
 from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
 from tissuq.experiments.reading.arrangement import names_above
@@ -51,6 +50,8 @@ NUMBERED = re.compile(
 """As in ``Width 2 (mm)`` and ``Thickness #1``; two letters at least, so not ``L0``."""
 LONGEST_NAME = 80
 """Characters of the name of a size."""
+SizesInLine = Sequence[tuple[str, int]]
+"""Values of one size in a line, each with the column from which on what stands beneath it belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +111,7 @@ def _of_test(size: StatedSize, sizes: Sequence[StatedSize], test: TestBeside) ->
             name_of_size = plain(re.sub(rf"(?<!\w){re.escape(plain(name))}(?!\w)", " ", size.name))
             if name_of_size != size.name and dimensions_named(name_of_size, is_cylinder=True):
                 return replace(size, name=name_of_size) if name == test.name else None
-    numbers = {
-        same_size.measurement for same_size in sizes if (same_size.name, same_size.kind) == (size.name, size.kind)
-    }
+    numbers = {same.measurement for same in sizes if (same.name, same.kind) == (size.name, size.kind)}
     if not size.measurement or len(numbers) < len(test.loads):
         return size
     if numbers == set(test.numbers) and size.measurement != test.number:
@@ -127,12 +126,7 @@ def names_of_specimen(
     columns = [k for k, quantity in enumerate(table.quantities) if is_of_specimens(quantity)]
     cells = [set(table.texts(column)) - {""} for column in columns]
     wanted = [str(value) for name, value in (only or {}).items() if plain(name) not in CYCLE_NAMES | SET_NAMES]
-    names = [
-        table.sheet,
-        table.title,
-        *wanted,
-        *(cell for values in cells if len(values) == 1 for cell in values),
-    ]
+    names = [table.sheet, table.title, *wanted, *(cell for values in cells if len(values) == 1 for cell in values)]
     loads = [k for k, name in enumerate(table.names) if name == table.names[choices[0].stress]]
     if len(loads) > 1 and (names_over := names_above(table, loads)):
         names.append(names_over[loads.index(choices[0].stress)])
@@ -144,19 +138,19 @@ def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     is_of_one = not table.number and not any(map(is_of_specimens, table.quantities))
     for line, text in table.head:
         text, source = text.lstrip("# "), f"in line {line}"
-        if several := sizes_in_line(text, table.separator):
-            for sizes in several:
-                is_measured_again = is_of_one and not are_named(sizes, table)
-                yield from _of_several(sizes, test, source, is_measured_again=is_measured_again)
+        if several := _sizes_in_line(text, table.separator):
+            for name, values in several.items():
+                are_measured_again = is_of_one and not test and not _are_named(values, table)
+                yield from _of_several(name, values, test, source, are_measured_again=are_measured_again)
             continue
         cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
         statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
         words = list(_words(statements))
         pairs = zip(words, words[1:], [*words[2:], ("", "")], strict=False)
         clear = [
-            replace(size, measurement=measurement if is_of_one or test else "")
+            size
             for (name, measurement), (number, _), (unit, _) in pairs
-            for size in _of_words(name, number, unit, source)
+            for size in _of_words(name, number, unit, source, measurement if is_of_one or test else "")
         ]
         yield from clear if clear else _among_words(text, source)
 
@@ -174,22 +168,21 @@ def _words(statements: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _of_several(
-    sizes: SizesInLine, test: TestBeside | None, source: str, *, is_measured_again: bool
+    name: str, values: SizesInLine, test: TestBeside | None, source: str, *, are_measured_again: bool
 ) -> Iterator[StatedSize]:
     """Yield the value of a test of several that a line states, or all: of one specimen they are its measurements."""
-    if test and (text := sizes.over(test)) is not None:
-        yield from _sizes(heading(sizes.name), text, f"{source}, over its columns", f"{sizes.name}: {text}")
+    if test and (text := _over(values, test)) is not None:
+        yield from _sizes(heading(name), text, f"{source}, over its columns", f"{name}: {text}")
         return
-    for number, value in enumerate(sizes.values, 1):
-        for size in _sizes(heading(sizes.name), value.text, source, f"{sizes.name}: {value.text}"):
-            yield replace(size, measurement=str(number) if is_measured_again and not test else "")
+    for number, (text, _) in enumerate(values, 1):
+        yield from _sizes(heading(name), text, source, f"{name}: {text}", str(number) if are_measured_again else "")
 
 
-def _of_words(name: str, number: str, unit: str, source: str) -> list[StatedSize]:
+def _of_words(name: str, number: str, unit: str, source: str, measurement: str) -> list[StatedSize]:
     """Return the sizes that a name, and what follows it, state; the unit is with one of them, or comes next."""
     for text in (f"{number} {unit}", number):
         value = DEVIATION.sub("", text)
-        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}"):
+        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}", measurement):
             return sizes
     return []
 
@@ -214,8 +207,7 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
             continue
         value, source = next(iter(cells)), f"in column {table.label(column)}"
         for unit in table.stated_units(column):
-            sizes = _sizes(Heading(quantity, unit), value, source, f"{name}: {value}")
-            yield from (replace(size, measurement=measurement) for size in sizes)
+            yield from _sizes(Heading(quantity, unit), value, source, f"{name}: {value}", measurement)
 
 
 def _only_specimen(table: Table) -> set[str]:
@@ -257,50 +249,36 @@ def _of_specimens(
                     name = Heading(name.quantity, *in_table)
                     source = f"{stated_in} ({name.unit} {UNIT_ASSUMED}"
                 quantity, measurement = numbered(name.quantity)
-                sizes = _sizes(Heading(quantity, name.unit), cells[column], source, f"{name.quantity}: {cells[column]}")
-                yield from (replace(size, measurement=measurement) for size in sizes)
+                shown = f"{name.quantity}: {cells[column]}"
+                yield from _sizes(Heading(quantity, name.unit), cells[column], source, shown, measurement)
 
 
-def _sizes(name: Heading, text: str, source: str, shown: str) -> list[StatedSize]:
+def _sizes(name: Heading, text: str, source: str, shown: str, measurement: str = "") -> list[StatedSize]:
     """Return the length or the area that a text states, in the unit there or beside the name; nothing for others.
 
     Of a product such as ``5 x 2 mm`` they are the sizes that the name has for its factors, or else the area of two.
     """
+    values = list[tuple[str, Quantity, float]]()
     sides, unit = sides_and_unit(text)
     if sides and min(sides) > 0 and (factor := LENGTH.factor_or_none(unit or name.unit)):
         names = [NAMES_OF_SIDES.get(side, side) for side in re.split(CROSS_OF_NAMES, name.quantity)]
         if len(names) == len(sides):
-            pairs = zip(names, sides, strict=True)
-            return [StatedSize(side, LENGTH, number * factor, source, shown) for side, number in pairs]
-        is_area = len(sides) == 2
-        return [StatedSize(name.quantity, AREA, prod(sides) * factor**2, source, shown)] if is_area else []
-    number, unit = number_and_unit(text)
-    for kind in (LENGTH, AREA):
-        factor = kind.factor_or_none(unit or name.unit)
-        if number and number > 0 and factor:
-            return [StatedSize(name.quantity, kind, number * factor, source, shown)]
-    return []
+            values = [(side, LENGTH, number * factor) for side, number in zip(names, sides, strict=True)]
+        elif len(sides) == 2:
+            values = [(name.quantity, AREA, prod(sides) * factor**2)]
+    else:
+        number, unit = number_and_unit(text)
+        factors = [(kind, kind.factor_or_none(unit or name.unit)) for kind in (LENGTH, AREA)]
+        values = [(name.quantity, kind, (number or 0.0) * factor) for kind, factor in factors if factor]
+    return [StatedSize(*value, source, shown, measurement) for value in values if value[2] > 0]
 
 
-class Place(NamedTuple):
-    """A value in a line, and the column from which on what stands beneath it belongs to it."""
-
-    text: str
-    column: int
-
-
-class SizesInLine(NamedTuple):
-    """Values of one size in a line, in their order, under its name, with its unit."""
-
-    name: str
-    values: list[Place]
-
-    def over(self, test: TestBeside) -> str | None:
-        """Return the value over the columns of a test; None where not every test has one, and every value a test."""
-        owners = [sum(value.column <= load for value in self.values) - 1 for load in test.loads]
-        if sorted(owners) != list(range(len(self.values))):
-            return None
-        return self.values[owners[test.loads.index(test.load)]].text
+def _over(values: SizesInLine, test: TestBeside) -> str | None:
+    """Return the value over the columns of a test; None where not every test has one, and every value a test."""
+    owners = [sum(column <= load for _, column in values) - 1 for load in test.loads]
+    if sorted(owners) != list(range(len(values))):
+        return None
+    return values[owners[test.loads.index(test.load)]][0]
 
 
 def numbered(name: str) -> tuple[str, str]:
@@ -317,9 +295,9 @@ def numbered(name: str) -> tuple[str, str]:
     return name, ""
 
 
-def are_named(sizes: SizesInLine, table: Table) -> bool:
+def _are_named(values: SizesInLine, table: Table) -> bool:
     """Tell whether another line above a table names what stands in the columns of values, as those of specimens."""
-    columns = [value.column for value in sizes.values]
+    columns = [column for _, column in values]
     for _, text in table.head:
         cells = split(text, table.separator)
         if set(table.names) & {*cells} - {""}:
@@ -334,15 +312,21 @@ def are_named(sizes: SizesInLine, table: Table) -> bool:
     return False
 
 
-def sizes_in_line(text: str, separator: str) -> list[SizesInLine]:
-    """Return the sizes of which a line states more than one value, each in a cell."""
+def _sizes_in_line(text: str, separator: str) -> dict[str, SizesInLine]:
+    """Return the sizes of which a line states more than one value, each in a cell, by their names.
+
+    Where those at the end of a line without cells belong is not told by their columns.
+    """
     if separator == WHITESPACE:
-        return _after_words(text)
+        words = text.split()
+        count = next((k for k, word in enumerate(reversed(words)) if not NUMBER.fullmatch(word)), len(words))
+        name = " ".join(words[: len(words) - count]).rstrip(" :=")
+        is_size = bool(dimensions_named(heading(name).quantity, is_cylinder=True))
+        return {name: [(number, 0) for number in words[-count:]]} if count > 1 and is_size else {}
     label, of_label = "", -1
     values, labels = dict[str, list[tuple[str, int, int]]](), list[str]()
     cells = enumerate(split(text, separator))
-    words = ((column, word.strip()) for column, cell in cells for word in re.split("[:=]", cell))
-    for column, word in words:
+    for column, word in ((column, word.strip()) for column, cell in cells for word in re.split("[:=]", cell)):
         is_value = number_and_unit(word)[0] is not None
         if is_value and label:
             values.setdefault(label, []).append((word, column, of_label))
@@ -351,18 +335,8 @@ def sizes_in_line(text: str, separator: str) -> list[SizesInLine]:
             label = word if dimensions_named(heading(word).quantity, is_cylinder=True) else ""
             of_label = column
             labels.append(label)
-    several = {name: cells for name, cells in values.items() if len(cells) > 1}
-    return [
-        SizesInLine(name, [Place(cell, start if labels.count(name) > 1 else column) for cell, column, start in cells])
-        for name, cells in several.items()
-    ]
-
-
-def _after_words(text: str) -> list[SizesInLine]:
-    """Return the values at the end of a line without cells; where they belong is not told by their columns."""
-    words = text.split()
-    count = next((k for k, word in enumerate(reversed(words)) if not NUMBER.fullmatch(word)), len(words))
-    name = " ".join(words[: len(words) - count]).rstrip(" :=")
-    if count < 2 or not dimensions_named(heading(name).quantity, is_cylinder=True):
-        return []
-    return [SizesInLine(name, [Place(number, 0) for number in words[-count:]])]
+    return {
+        name: [(cell, start if labels.count(name) > 1 else column) for cell, column, start in cells]
+        for name, cells in values.items()
+        if len(cells) > 1
+    }

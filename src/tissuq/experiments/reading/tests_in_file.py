@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -89,26 +89,12 @@ def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False)
     """Return all tests in one file or table, and warn of what there is to know of them."""
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
-    noted = _concerned((test.name, text) for test in tests for text in test.reading.notes)
-    for text, names in noted.items():
+    names_of_text = dict[str, list[str]]()
+    for name, text in dict.fromkeys((test.name, text) for test in tests for text in test.reading.notes):
+        names_of_text.setdefault(text, []).append(name)
+    for text, names in names_of_text.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=3)
     return [test.reading.experiment for test in tests]
-
-
-def _concerned(messages: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the names that every text concerns, of pairs of a name and a text, both in the order of the first.
-
-    Examples
-    --------
-    >>> _concerned([("A", "torn"), ("B", "torn"), ("B", "slack")])
-    {'torn': ['A', 'B'], 'slack': ['B']}
-    """
-    names: dict[str, list[str]] = {}
-    for name, text in messages:
-        of_text = names.setdefault(text, [])
-        if name not in of_text:
-            of_text.append(name)
-    return names
 
 
 def _is_read(data: Any) -> bool:
