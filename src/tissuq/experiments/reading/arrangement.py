@@ -28,7 +28,6 @@ __all__ = [
     "blocks_of",
     "joined_where_they_go_on",
     "names_above",
-    "number_before",
     "title_of",
     "transposed_table",
     "with_names_above",
@@ -186,11 +185,6 @@ def _goes_on_evenly(first_row: str, table: Table, later: Table) -> bool:
     largest = np.delete(steps, seam - 1, axis=0).max(axis=0, initial=0)
     begins_alike = np.abs(numbers[seam + 1] - numbers[0]) <= SAME * np.ptp(numbers, axis=0)
     return bool((steps[seam - 1] <= MOST_STEPS * largest).all() and not begins_alike.all())
-
-
-def number_before(names: Sequence[str]) -> str:
-    """Return the number of a table that stands before the names of its columns; an empty text where none does."""
-    return names[0] if names and NUMBER.fullmatch(names[0]) else ""
 
 
 def title_of(lines_above: Sequence[str], separator: str) -> str:

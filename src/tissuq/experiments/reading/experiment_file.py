@@ -40,10 +40,10 @@ from tissuq.experiments.reading.regions import (
 )
 from tissuq.experiments.reading.rows_of_tests import (
     SeveralSpecimens,
-    check_labels,
     columns_only,
     labels_of,
     only_rows,
+    other_label,
     specimen_of,
 )
 from tissuq.experiments.reading.signs import check_signs, with_signs
@@ -280,7 +280,8 @@ def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     table = table_of(path, plain)
     rows = only_rows(table, columns_only(table, plain.get("only")))
     reading = read_rows(rows, table.file if is_data_frame(path) else path, **plain)
-    check_labels(table, reading.experiment, plain.get("only"))
+    if refusal := other_label(table, reading.experiment, plain.get("only")):
+        raise InputError(refusal)
     return reading
 
 

@@ -263,11 +263,11 @@ def _without_percent_signs(table: Table) -> Table:
     if not [row for row in table.rows if "%" in row]:  # a generator is called for every row
         return table
     rows = table.cells()
-    columns = [
-        column
-        for column, cells in enumerate(zip(*rows, strict=True))
-        if _are_percentages(cells) and set(table.stated_units(column)) <= {"", "%"}
-    ]
+    columns = []
+    for column, cells in enumerate(zip(*rows, strict=True)):
+        filled = [cell for cell in cells if cell.lower() not in MISSING]
+        if filled and all(map(PERCENTAGE.fullmatch, filled)) and set(table.stated_units(column)) <= {"", "%"}:
+            columns.append(column)
     if not columns:
         return table
     units = ["%" if column in columns else unit for column, unit in enumerate(table.units)]
@@ -277,11 +277,6 @@ def _without_percent_signs(table: Table) -> Table:
     names = " and ".join(map(table.label, columns))
     note = f"{names}: the cells are percentages, and were read as numbers in %."
     return replace(table.with_cells(without), units=tuple(units)).noted(note)
-
-
-def _are_percentages(cells: Sequence[str]) -> bool:
-    measured = [cell for cell in cells if cell.lower() not in MISSING]
-    return bool(measured) and all(map(PERCENTAGE.fullmatch, measured))
 
 
 def _with_spreads_apart(table: Table) -> Table:

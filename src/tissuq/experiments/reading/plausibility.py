@@ -62,9 +62,26 @@ INDEPENDENT_ROWS = 10
 
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
     """Refuse columns of stretches that are not positive, or that are strains by their size."""
+    table = measured.table
     for choice, stretch in zip(choices, measured.stretch, strict=True):
-        if choice.measure not in SHEARS:
-            _check_stretch(measured.table, choice, stretch)
+        is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
+        if choice.measure in SHEARS or (is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT)):
+            continue
+        name = table.key(choice.deformation)
+        if is_strain:
+            advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
+        else:
+            advice = (
+                "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
+                f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
+            )
+        if is_positive:
+            raise InputError(
+                f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
+                f"{stretch.max():g}) look like strain, not stretch. {advice}"
+            )
+        row = int(np.flatnonzero(stretch <= 0)[0])
+        raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
 
 
 def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Column, has_unit: bool) -> None:
@@ -85,27 +102,6 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
             f'never comes near 0: it looks like a stretch. Say so: columns={{"stretch": "{name}"}} or '
             f"--column stretch={_quoted(name)}."
         )
-
-
-def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
-    is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
-    if is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT):
-        return
-    name = table.key(choice.deformation)
-    if is_strain:
-        advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
-    else:
-        advice = (
-            "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
-            f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
-        )
-    if is_positive:
-        raise InputError(
-            f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
-            f"{stretch.max():g}) look like strain, not stretch. {advice}"
-        )
-    row = int(np.flatnonzero(stretch <= 0)[0])
-    raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
 
 
 def _quoted(name: str) -> str:

@@ -155,19 +155,12 @@ def _by_unit(table: Table, quantities: Sequence[str]) -> dict[str, list[int]]:
     """Return the columns that vary, and that no name says are of something else, by the kind of their unit."""
     columns_of: dict[str, list[int]] = {}
     for column, quantity in enumerate(quantities):
-        is_other = _is_of_something_else(quantity) or other_quantity(quantity, table.unit(column))
+        unit = table.unit(column)
+        is_other = quantity in CYCLE_NAMES or bool(dimensions_named(quantity) or other_quantity(quantity, unit))
+        is_other = is_other or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
         if not is_other and not table.is_constant(column):
-            columns_of.setdefault(measured_in(table.unit(column)), []).append(column)
+            columns_of.setdefault(measured_in(unit), []).append(column)
     return columns_of
-
-
-def _is_of_something_else(quantity: str) -> bool:
-    """Tell whether a name is of a dimension of the specimen, a count, a time or a modulus."""
-    return (
-        quantity in CYCLE_NAMES
-        or bool(dimensions_named(quantity))
-        or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
-    )
 
 
 def recognise(

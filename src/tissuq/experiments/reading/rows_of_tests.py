@@ -22,11 +22,11 @@ __all__ = [
     "LABELS",
     "SeveralSpecimens",
     "advice_on_numbered_tests",
-    "check_labels",
     "check_one_specimen",
     "columns_only",
     "labels_of",
     "only_rows",
+    "other_label",
     "row_names",
     "specimen_of",
 ]
@@ -142,8 +142,8 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 def specimen_of(table: Table) -> str:
     """Return the specimen that columns name, of which all rows are; an empty text where they name none, or several."""
     columns = [column for column in range(len(table.names)) if is_of_specimens(table.quantities[column])]
-    labels = [set(row_names(table, column)) for column in columns]
-    return " ".join(names.pop() for names in labels) if all(len(names) == 1 for names in labels) else ""
+    labels = [_text_of_all_rows(table, column) for column in columns]
+    return " ".join(labels) if all(labels) else ""
 
 
 def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], course: Column) -> str:
@@ -216,7 +216,12 @@ def labels_of(table: Table, names: Sequence[str]) -> dict[str, str]:
     >>> labels_of(table, ["aorta circumferential", "sheet 1"])
     {'direction': 'circumferential', 'condition': 'frozen'}
     """
-    return {label: _in_column(table, column) or _in_names(names, words) for label, (column, words) in LABELS.items()}
+    labels = dict[str, str]()
+    for label, (pattern, words) in LABELS.items():
+        columns = [column for column, name in enumerate(table.quantities) if re.fullmatch(pattern, name)]
+        stated = _text_of_all_rows(table, columns[0]) if len(columns) == 1 else ""
+        labels[label] = stated or _in_names(names, words)
+    return labels
 
 
 def columns_only(table: Table, only: Mapping[str, str | int] | None) -> dict[str, str | int]:
@@ -225,25 +230,19 @@ def columns_only(table: Table, only: Mapping[str, str | int] | None) -> dict[str
     return {name: value for name, value in (only or {}).items() if name.lower() not in stated}
 
 
-def check_labels(table: Table, experiment: Experiment, only: Mapping[str, str | int] | None) -> None:
-    """Refuse a test whose direction or condition is not what is asked for.
-
-    Raises
-    ------
-    InputError
-        With what it is, as far as anything says so.
-    """
+def other_label(table: Table, experiment: Experiment, only: Mapping[str, str | int] | None) -> str:
+    """Return that the direction or condition of a test is not what is asked for; an empty text where it is."""
     for name in set(only or {}) - columns_only(table, only).keys():
         wanted, stated_label = str((only or {})[name]), getattr(experiment, name.lower())
         if stated_label.lower() != wanted.strip().lower():
             is_what = f"is '{stated_label}'" if stated_label else "is not said by a column or a name"
-            raise InputError(f"{table.file}: the {name.lower()} of the test {is_what}, not '{wanted}'. Leave it out.")
+            return f"{table.file}: the {name.lower()} of the test {is_what}, not '{wanted}'. Leave it out."
+    return ""
 
 
-def _in_column(table: Table, pattern: str) -> str:
-    """Return the text in all rows of the only column of a label."""
-    columns = [k for k, quantity in enumerate(table.quantities) if re.fullmatch(pattern, quantity)]
-    cells = set(row_names(table, columns[0])) if len(columns) == 1 else set[str]()
+def _text_of_all_rows(table: Table, column: int) -> str:
+    """Return the text in all rows of a column; an empty text where there are several."""
+    cells = set(row_names(table, column))
     return cells.pop() if len(cells) == 1 else ""
 
 

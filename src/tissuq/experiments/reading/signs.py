@@ -70,8 +70,10 @@ def with_signs(
         _check_names(measured, choices, direction)
         return measured
     if not compression_positive:
-        falls = choices[0].measure in ("strain", "displacement") and _falls_in_tension(measured)
-        return _turned(measured, choices, ("deformation",), "tension is positive") if falls else measured
+        strain, stress = measured.stretch - 1, measured.stress
+        falls = float((stress * strain).sum()) < 0 and strain.max() < -NEGLIGIBLE_STRAIN * strain.min()
+        is_turned = choices[0].measure in ("strain", "displacement") and falls and stress.sum() > 0
+        return _turned(measured, choices, ("deformation",), "tension is positive") if is_turned else measured
     return _with_compression_negative(measured, choices)
 
 
@@ -100,13 +102,6 @@ def _with_compression_negative(measured: MeasuredRows, choices: Sequence[ColumnC
         stress = np.where(strain < 0, -measured.stress, measured.stress)
         return replace(measured, stress=stress).with_step("sign changed at stretch < 1")
     return _turned(measured, choices, TURNS["both" if in_tension > 0 and not says_direction else "load"], why)
-
-
-def _falls_in_tension(measured: MeasuredRows) -> bool:
-    """Tell whether strains are negative where the load is positive all along."""
-    strain = measured.stretch - 1
-    is_turned = float((measured.stress * strain).sum()) < 0 and strain.max() < -NEGLIGIBLE_STRAIN * strain.min()
-    return bool(is_turned and measured.stress.sum() > 0)
 
 
 def _turned(measured: MeasuredRows, choices: Sequence[ColumnChoice], what: Sequence[str], why: str) -> MeasuredRows:
@@ -187,11 +182,24 @@ def check_signs(
 def _check_work(
     measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, unit: StressUnit
 ) -> None:
-    if choices[0].measure in SHEARS:
-        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0], unit)
+    choice, stretch, stress = choices[0], measured.stretch[0], measured.stress[0]
+    if choice.measure in SHEARS:
+        row = _wrong_sign(1 + stretch, stress, np.ones(len(stretch), dtype=bool))
+        if row is not None:
+            raise InputError(
+                f"{measured.table.place(choice.stress, row)}: at an amount of shear of {stretch[row]:g} the shear "
+                f"stress is {unit.written(stress[row])}; it must have the sign of the shear. Turn one of them, "
+                "turn='load' (--turn load), or check which columns are read."
+            )
         return
-    if choices[0].load == "pressure":
-        _check_inflation(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+    if choice.load == "pressure":
+        row = _wrong_sign(stretch, stress, stretch < 1)
+        if row is not None:
+            raise InputError(
+                f"{measured.table.place(choice.deformation, row)}: the tube is under pressure and narrower than "
+                f"undeformed (stretch {stretch[row]:g} in the middle of the wall). Give the outer diameter that it has "
+                "without pressure (--diameter), or check which columns are read."
+            )
         return
     change = measured.stretch - 1
     alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
@@ -247,26 +255,6 @@ def _check_signs(
         raise InputError(
             f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
             f"is negative ({unit.written(stress[row])}); tension must be positive. {advice}"
-        )
-
-
-def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column, unit: StressUnit) -> None:
-    row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
-    if row is not None:
-        raise InputError(
-            f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
-            f"{unit.written(stress[row])}; it must have the sign of the shear. Turn one of them, turn='load' "
-            "(--turn load), or check which columns are read."
-        )
-
-
-def _check_inflation(table: Table, choice: ColumnChoice, stretch: Column, stress: Column) -> None:
-    row = _wrong_sign(stretch, stress, stretch < 1)
-    if row is not None:
-        raise InputError(
-            f"{table.place(choice.deformation, row)}: the tube is under pressure and narrower than undeformed (stretch "
-            f"{stretch[row]:g} in the middle of the wall). Give the outer diameter that it has without pressure "
-            "(--diameter), or check which columns are read."
         )
 
 

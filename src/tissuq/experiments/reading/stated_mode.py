@@ -120,8 +120,10 @@ def mode_of(
     if (wanted := options.get("mode")) is not None:
         return wanted, GIVEN
     mode, source = "", ""
-    if not mode_in_comment(Path(file)):
-        mode, source = _mode_in_column(table)
+    for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
+        if len(modes := modes_in_column(table, column)) == 1:
+            mode, source = modes.pop(), f"column {table.label(column)}"
+            break
     if not mode:
         mode, source = find_mode(file, [table.sheet, table.title, *words])
     columns = options.get("columns") or {}
@@ -178,15 +180,6 @@ def about_mode(mode: str, source: str) -> Iterator[None]:
         if not mode or source in ("", GIVEN, DEFAULT_SOURCE):
             raise
         raise InputError(f"{error} (The loading mode {mode} is from {source}; give --mode for another.)") from error
-
-
-def _mode_in_column(table: Table) -> tuple[str, str]:
-    """Return the mode that a column names in all rows that say one, and which column; empty texts for several."""
-    for column in range(len(table.names)):
-        modes = modes_in_column(table, column)
-        if len(modes) == 1:
-            return modes.pop(), f"column {table.label(column)}"
-    return "", ""
 
 
 def _mode_of_columns(table: Table) -> tuple[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -22,7 +22,7 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, check_labels, columns_only, only_rows, row_names
+from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
@@ -197,32 +197,15 @@ def find_tests_in_file(
     longest = max((len(test.reading.recorded) for test in tests), default=0)
     of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
     tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
-    tests = _of_labels(tests, options.get("only"))
+    refusals = [other_label(test.reading.table, test.reading.experiment, options.get("only")) for test in tests]
+    if refusals and all(refusals):
+        raise InputError(refusals[0])
+    tests = [test for test, refusal in zip(tests, refusals, strict=True) if not refusal]
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
     notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in unrecognised]
     notes += [f"{table.file} is left out: it is short, and cannot be read as a test." for table, _ in unreadable]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
-
-
-def _of_labels(tests: list[TestInFile], only: Mapping[str, str | int] | None) -> list[TestInFile]:
-    """Return the tests whose direction and condition are those asked for.
-
-    Raises
-    ------
-    InputError
-        When there is none: why the first is not.
-    """
-    refusals, matching = list[InputError](), list[TestInFile]()
-    for test in tests:
-        try:
-            check_labels(test.reading.table, test.reading.experiment, only)
-            matching.append(test)
-        except InputError as refusal:
-            refusals.append(refusal)
-    if refusals and not matching:
-        raise refusals[0]
-    return matching
 
 
 def _are_few(rows: int, longest: int) -> bool:
