@@ -25,6 +25,7 @@ from tissuq.experiments.reading.headings import (
     on_axis,
     plain,
 )
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
     DEFORMATIONS_OF_UNITS,
@@ -50,40 +51,20 @@ __all__ = [
 ]
 
 
-def choose_columns(
-    table: Table,
-    mode: LoadingMode,
-    mapping: Mapping[str, str | int] | None,
-    strain_type: str | None,
-    stress_type: str | None,
-    axis: str | None,
-) -> dict[str, ColumnChoice]:
+def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:
     """Return the columns of every stress of a mode, by what it is called; of a mode with one by an empty text.
 
-    They are those of the mapping, the others are known by their names: a stress goes before a force, a stretch or
+    They are those of the options, the others are known by their names: a stress goes before a force, a stretch or
     strain before a displacement. Those of a second stress are known by the axis in their names, or given in roles that
-    end in 2.
-
-    Parameters
-    ----------
-    table : Table
-        The table to choose from.
-    mode : LoadingMode
-    mapping : mapping or None
-        From a role (stretch, strain, displacement, length, shear, twist or a diameter; stress, torque, force or
-        pressure) to the name of a column, or its number from 1.
-    strain_type, stress_type : str or None
-        Which measures they are, by the names in `STRAIN_MEASURES` and `STRESS_MEASURES`; what the columns' names say
-        where none is given, and engineering where these say nothing.
-    axis : str or None
-        ``x`` or ``y``: whose columns are read from the file of a biaxial machine in a mode with one stress.
+    end in 2. Which measures of strain and stress they are, names say where no option does; engineering ones where these
+    say nothing.
 
     Raises
     ------
     InputError
         When a role or column does not exist, several columns fit, or none does.
     """
-    count = len(mode.stresses)
+    count, mapping, axis = len(mode.stresses), options.get("columns"), options.get("axis")
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
@@ -100,7 +81,7 @@ def choose_columns(
         if number and len(mode.controls) == 1:
             roles = roles | {choices[0].measure: choices[0].deformation + 1}
         with about_stress(number, labels, mode):
-            choices.append(_choice(table, mode, roles, (strain_type, stress_type), axis_of_stress))
+            choices.append(_choice(table, mode, roles, options, axis_of_stress))
     if count > 1:
         check_together(table, mode, choices)
     return dict(zip(labels, choices, strict=True))
@@ -182,16 +163,13 @@ def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] |
 
 
 def _choice(
-    table: Table,
-    mode: LoadingMode,
-    mapping: Mapping[str, str | int],
-    types: tuple[str | None, str | None],
-    axis: str | None,
+    table: Table, mode: LoadingMode, mapping: Mapping[str, str | int], options: ReadingOptions, axis: str | None
 ) -> ColumnChoice:
-    """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
+    """Return the columns of one stress, in roles that are given or by their names."""
     is_shear, unnamed = mode.controls == (SHEAR,), set[int]()
     check_roles(table, mapping, is_shear)
-    contents = Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
+    quantities, measures = _quantities(table, axis, mapping), [measure for _, measure in _names(table)]
+    contents = Contents(quantities, measures, options.get("strain_type"), options.get("stress_type"))
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
     load = next((role for role in LOADS if role in mapping), None)
     if load:

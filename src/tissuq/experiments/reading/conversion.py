@@ -10,7 +10,6 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import about_stress, mapping_of_each_stress
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions
@@ -52,10 +51,7 @@ def measured_rows(
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     check_one_specimen(table, columns, np.mean([deformation for deformation, _ in numbers], axis=0))
     specimens = names_of_specimen(table, columns, options.get("only"))
-    test = None
-    if len(columns) == 1:
-        is_shear = mode.controls == (SHEAR,)
-        test = test_beside(table, columns[0].stress, options.get("stress_type"), is_shear=is_shear)
+    test = test_beside(table, columns[0].stress, mode, options) if len(columns) == 1 else None
     dimensions = dimensions_of(table, options.get("dimensions"), specimens, test)
     if len(columns) == 1:
         words = [Path(table.file).name, table.sheet, table.title, options.get("name") or ""]

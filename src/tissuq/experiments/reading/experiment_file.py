@@ -25,7 +25,7 @@ from tissuq.experiments.reading.conversion import (
     with_engineering_stress,
 )
 from tissuq.experiments.reading.data_frame import is_data_frame
-from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles, of_cycle
+from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice
@@ -299,10 +299,9 @@ def read_rows(
     """
     stated, mode_source = mode_of(path, table, options, words)
     mode = checked_mode(stated, options)
-    name, is_positive = options.get("name"), options.get("compression_positive")
-    types = options.get("strain_type"), options.get("stress_type")
+    name = options.get("name")
     with about_mode(mode.name, mode_source):
-        labelled_choices = choose_columns(table, mode, options.get("columns"), *types, options.get("axis"))
+        labelled_choices = choose_columns(table, mode, options)
     choices = tuple(labelled_choices.values())
     if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
         check_not_sheared(table)
@@ -319,11 +318,10 @@ def read_rows(
         absent, table = set(table.lines) - set(readable.lines), readable
         measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
-    recorded = with_signs(
-        measured, choices, is_positive, options.get("turn"), direction_of(*(text for _, text in table.head), *names)
-    )
+    direction = direction_of(*(text for _, text in table.head), *names)
+    recorded = with_signs(measured, choices, options, direction)
     cycles = find_cycles(table, recorded.course)
-    used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
+    used = recorded.of_cycle(cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
         used = used.without_lines(lines, absent)
     reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
@@ -353,7 +351,7 @@ def read_rows(
     if (step := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
-    check_signs(used, choices, bool(is_positive), options.get("turn"), shown)
+    check_signs(used, choices, options, shown)
     if mode.name == Uniaxial.name and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
         used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
@@ -368,7 +366,7 @@ def read_rows(
         least_errors=errors | least_errors(tested),
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
     problems = (spread.problem for spread in spreads if spread.problem)
-    doubts = *assumptions(used, choices, types[1]), *dimensions.averages, *dimensions.contradictions
+    doubts = *assumptions(used, choices, options), *dimensions.averages, *dimensions.contradictions
     about_loads = filter(None, (load.note for load in loads))
     notes = *table.notes, *problems, *about_loads
     return Reading(

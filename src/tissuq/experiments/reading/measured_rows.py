@@ -18,7 +18,7 @@ from tissuq.experiments.reading.table import Column, Table, rows_in
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
-__all__ = ["BRANCHES", "COUNTED_FROM", "Cycle", "Dropped", "MeasuredRows", "find_cycles", "labelled", "of_cycle"]
+__all__ = ["BRANCHES", "COUNTED_FROM", "Cycle", "Dropped", "MeasuredRows", "find_cycles", "labelled"]
 
 COUNTED_FROM = "stretch counted from"
 """How the step begins that says where the specimen is undeformed."""
@@ -101,6 +101,25 @@ class MeasuredRows:
             return self
         counts = (count,) * len(self.labels)
         return replace(self.taken(rows), dropped=(*self.dropped, Dropped(counts, reason)))
+
+    def of_cycle(self, cycles: Sequence[Cycle], cycle: str | int | None, branch: str | None) -> MeasuredRows:
+        """Return the rows of one cycle (``first``, ``last`` or its number from 1), one branch, or both.
+
+        Raises
+        ------
+        InputError
+            When there is no such cycle or branch.
+        """
+        if branch is not None and branch not in BRANCHES:
+            raise InputError(f"branch must be one of {', '.join(BRANCHES)}, not '{branch}'.")
+        if cycle is None and branch is None:
+            return self
+        wanted = list(cycles) if cycle is None else [cycles[_position(self.table.file, len(cycles), cycle)]]
+        rows = np.unique(np.concatenate([wanted_cycle.rows(branch) for wanted_cycle in wanted]))
+        if branch == "unloading" and len(rows) <= len(wanted):
+            raise InputError(f"{self.table.file}: there is no unloading in {_words(wanted, cycles)}.")
+        what = f"{branch} of {_words(wanted, cycles)}" if branch else _words(wanted, cycles)
+        return self.kept(rows, f"not {what}").with_step(f"only {what}")
 
     def until_peak(self) -> MeasuredRows:
         """Return the rows up to the largest stress; of several, to where they are largest together."""
@@ -313,28 +332,6 @@ def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
         Cycle(str(number), start, ends[2 * number - 1], stop + (stop == len(stretch) - 1))
         for number, (start, stop) in enumerate(pairwise(bounds), start=1)
     ]
-
-
-def of_cycle(
-    measured: MeasuredRows, cycles: Sequence[Cycle], cycle: str | int | None, branch: str | None
-) -> MeasuredRows:
-    """Return the rows of one cycle (``first``, ``last`` or its number from 1), one branch, or both.
-
-    Raises
-    ------
-    InputError
-        When there is no such cycle or branch.
-    """
-    if branch is not None and branch not in BRANCHES:
-        raise InputError(f"branch must be one of {', '.join(BRANCHES)}, not '{branch}'.")
-    if cycle is None and branch is None:
-        return measured
-    wanted = list(cycles) if cycle is None else [cycles[_position(measured.table.file, len(cycles), cycle)]]
-    rows = np.unique(np.concatenate([wanted_cycle.rows(branch) for wanted_cycle in wanted]))
-    if branch == "unloading" and len(rows) <= len(wanted):
-        raise InputError(f"{measured.table.file}: there is no unloading in {_words(wanted, cycles)}.")
-    what = f"{branch} of {_words(wanted, cycles)}" if branch else _words(wanted, cycles)
-    return measured.kept(rows, f"not {what}").with_step(f"only {what}")
 
 
 def _words(wanted: Sequence[Cycle], cycles: Sequence[Cycle]) -> str:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.arrangement import names_above
 from tissuq.experiments.reading.headings import (
     AXES,
@@ -16,6 +18,7 @@ from tissuq.experiments.reading.headings import (
     on_lettered_axis,
     without_mean,
 )
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES, other_quantity
@@ -66,15 +69,15 @@ class _Role(NamedTuple):
     test: str
 
 
-def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: bool) -> list[ColumnsOfTest]:
+def columns_side_by_side(table: Table, mode: LoadingMode, options: ReadingOptions) -> list[ColumnsOfTest]:
     """Return the columns of every test where a table has several beside one another; nothing where it has one.
 
     They are a stress or force for each test, and a deformation for each or one for all. Their names are the same, or
     differ in the number, letter or name of a specimen; the names of the tests may stand in the line above. Columns of
     loads that are known by their units alone are of specimens, or means of groups, beside one deformation of all.
     """
-    deformations = ("shear",) if is_shear else LENGTHENINGS
-    roles = [_role(quantity, (*deformations, *LOADS), stress_type) for quantity in table.quantities]
+    deformations = ("shear",) if mode.controls == (SHEAR,) else LENGTHENINGS
+    roles = [_role(name, (*deformations, *LOADS), options.get("stress_type")) for name in table.quantities]
     measure, measures = _columns_of_first(deformations, roles)
     is_by_unit = len(measures) == 1 and not any(role.role in LOADS for role in roles)
     if is_by_unit:
@@ -102,9 +105,9 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
     ]
 
 
-def test_beside(table: Table, load: int, stress_type: str | None, *, is_shear: bool) -> TestBeside | None:
+def test_beside(table: Table, load: int, mode: LoadingMode, options: ReadingOptions) -> TestBeside | None:
     """Return which of several tests in a table has a column of loads; None where the table holds one test."""
-    tests = columns_side_by_side(table, stress_type, is_shear=is_shear)
+    tests = columns_side_by_side(table, mode, options)
     loads = [int(column) - 1 for test in tests for column in [*test.columns.values()][1:]]
     if load not in loads:
         return None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
-from tissuq.experiments.reading.options import TURNS
+from tissuq.experiments.reading.options import TURNS, ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
@@ -34,24 +34,13 @@ NOTABLE_SHARE = 0.1
 
 
 def with_signs(
-    measured: MeasuredRows,
-    choices: Sequence[ColumnChoice],
-    compression_positive: bool | None,
-    turn: str | None,
-    direction: str,
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions, direction: str
 ) -> MeasuredRows:
     """Return the rows with lengthening and tension positive: some signs of the file turned.
 
-    Parameters
-    ----------
-    measured : MeasuredRows
-    choices : sequence of ColumnChoice
-    compression_positive : bool or None
-        Whether the file counts compression as positive; then the rows tell what is turned.
-    turn : str or None
-        What is turned, by a name in `TURNS`, whatever the rows tell.
-    direction : str
-        That of the load as names say it: compression, tension or an empty text.
+    An option says whether the file counts compression as positive, and then the rows tell what is turned; or another
+    one what is, whatever the rows tell. The direction is that of the load as names say it: compression, tension or an
+    empty text.
 
     Raises
     ------
@@ -59,6 +48,7 @@ def with_signs(
         When what is asked for has no meaning for the columns, or would change nothing, or a name says compression and
         nobody says its sign.
     """
+    compression_positive, turn = options.get("compression_positive"), options.get("turn")
     if turn is not None:
         return _turned(measured, choices, TURNS[turn], "as asked")
     if choices[0].measure in SHEARS or choices[0].load == "pressure":
@@ -159,20 +149,16 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
 
 
 def check_signs(
-    measured: MeasuredRows,
-    choices: Sequence[ColumnChoice],
-    compression_positive: bool,
-    turn: str | None,
-    unit: StressUnit,
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions, unit: StressUnit
 ) -> None:
     """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for.
 
     Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
     """
     try:
-        _check_work(measured, choices, compression_positive, unit)
+        _check_work(measured, choices, bool(options.get("compression_positive")), unit)
     except InputError as error:
-        if turn is None:
+        if (turn := options.get("turn")) is None:
             raise
         raise InputError(
             f"{error} (Signs are turned as asked, --turn {turn}: turn others, or leave it out.)"

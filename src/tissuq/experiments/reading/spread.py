@@ -78,10 +78,7 @@ def spread_of(
             return spread
         unused = f"column {table.label(spread.column)} is not used: standard deviations and standard errors"
         return replace(spread, problem=f"{unused} are taken of stresses or forces, not of {of_load}.")
-    if wanted:
-        column = find_column(table, wanted, mapping[wanted])
-        return _with_errors(table, choice, Spread(column, wanted), mapping, load, mean_of)
-    spread = _recognised(table, choice)
+    spread = Spread(find_column(table, wanted, mapping[wanted]), wanted) if wanted else _recognised(table, choice)
     if spread.column is None and mean_of is not None:
         raise InputError(
             f"{table.file}: mean_of={mean_of} (--mean-of) is for standard deviations beside a mean, and no column is "
@@ -92,6 +89,8 @@ def spread_of(
     try:
         return _with_errors(table, choice, spread, mapping, load, mean_of)
     except InputError as error:
+        if wanted:
+            raise
         return replace(spread, problem=f"{error} So the column is not used.")
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
@@ -226,14 +225,11 @@ def _side_by_side(
     """Return the columns of each test beside the others; None for the only test of a table."""
     stated, source = mode_of(path, table, options, names)
     mode = checked_mode(stated, options)
-    stress_type, columns = options.get("stress_type"), options.get("columns")
-    is_shear = mode.controls == (SHEAR,)
-    tests = (
-        columns_named_again(table, columns) if columns else columns_side_by_side(table, stress_type, is_shear=is_shear)
-    )
+    columns = options.get("columns")
+    tests = columns_named_again(table, columns) if columns else columns_side_by_side(table, mode, options)
     if not tests or len(mode.stresses) > 1:
         with about_mode(mode.name, source):
-            choose_columns(table, mode, columns, options.get("strain_type"), stress_type, options.get("axis"))
+            choose_columns(table, mode, options)
         return [None]
     return list(tests)
 
