@@ -145,8 +145,8 @@ def stress_unit(text: str) -> StressUnit:
         raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
     if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
-    factor = COMMON_STRESS_UNITS.get(compact)
-    return StressUnit(PASCALS.get(name.lower(), name), stress_factor(in_latin(name)) if factor is None else factor)
+    factor, spelling = COMMON_STRESS_UNITS.get(compact), name.lower() if name.lower() in WORDS else in_latin(name)
+    return StressUnit(PASCALS.get(name.lower(), name), stress_factor(spelling) if factor is None else factor)
 
 
 def _without_power(unit: str) -> tuple[float, str]:
@@ -326,6 +326,10 @@ SYMBOLS = frozenset().union(*(kind.factors for kind in (LENGTH, PIXELS, ANGLE, F
     "Hz", "K", "C", "F", "V", "mV", "percent", "pct",
 }  # fmt: skip
 """Units of quantities of any kind."""
+WORDS = {unit.replace("µ", "u").replace("μ", "u") for unit in (*SPELLINGS, *STRAIN_UNITS) if len(unit) > 1}
+WORDS |= {f"{prefix}pascal{end}" for prefix in ("", "kilo", "mega") for end in ("", "s")}
+WORDS -= {"meter", "micrometer"}
+"""Units in words, in small letters, but for those that instruments are called, too."""
 
 
 def measured_in(unit: str) -> str:
@@ -359,7 +363,7 @@ def looks_like_unit(text: str) -> bool:
         for symbol in re.split(r"(?:[\s·*/.^%°⁻²³-]|(?<!H)\d)+", text.replace("µ", "u").replace("μ", "u"))
         if symbol
     ]
-    return bool(symbols) and all(symbol in SYMBOLS for symbol in symbols)
+    return bool(symbols) and all(symbol in SYMBOLS or symbol.lower() in WORDS for symbol in symbols)
 
 
 def stress_units_in(text: str) -> list[str]:

@@ -225,8 +225,8 @@ def _read_every_line(
         return tables
     named = []
     for number, table in enumerate(tables, start=1):
-        short = [other for other in tables if other is not table and len(other.rows) <= SHORT]
-        beside = [line for other in short for line in (*other.head, *zip(other.lines, other.rows, strict=True))]
+        short = [neighbour for neighbour in tables if neighbour is not table and len(neighbour.rows) <= SHORT]
+        beside = [line for near in short for line in (*near.head, *zip(near.lines, near.rows, strict=True))]
         named.append(replace(table, file=f"{file}, table {number}", number=number, other_lines={"": beside}))
     return named
 
