@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +19,31 @@ from tissuq.experiments.reading.table import Column, Table, rows_in
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
-__all__ = ["BRANCHES", "COUNTED_FROM", "Cycle", "Dropped", "MeasuredRows", "find_cycles", "labelled"]
+__all__ = ["COUNTED_FROM", "Cycle", "Dropped", "MeasuredRows", "find_cycles", "labelled"]
 
 COUNTED_FROM = "stretch counted from"
 """How the step begins that says where the specimen is undeformed."""
 STRETCH_MARGIN = 1e-5
 """Share by which a stretch may lie beyond those that are asked for: they are printed with six digits."""
 
-BRANCHES = ("loading", "unloading")
+
+@dataclass(frozen=True)
+class Cycle:
+    """Rows of one cycle, counted from 0: from ``start`` up to ``stop``, turning at ``peak``.
+
+    Loading is the direction in which the cycle first goes, tension or compression.
+    """
+
+    label: str
+    start: int
+    peak: int
+    stop: int
+
+    def rows(self, branch: str | None = None) -> NDArray[np.intp]:
+        """Return its rows, or those of one branch; both branches have the turning point."""
+        start = self.peak if branch == "unloading" else self.start
+        stop = self.peak + 1 if branch == "loading" else self.stop
+        return np.arange(start, stop)
 
 
 @dataclass(frozen=True)
@@ -110,8 +128,6 @@ class MeasuredRows:
         InputError
             When there is no such cycle or branch.
         """
-        if branch is not None and branch not in BRANCHES:
-            raise InputError(f"branch must be one of {', '.join(BRANCHES)}, not '{branch}'.")
         if cycle is None and branch is None:
             return self
         wanted = list(cycles) if cycle is None else [cycles[_position(self.table.file, len(cycles), cycle)]]
@@ -222,10 +238,10 @@ class MeasuredRows:
             When no row carries the preload.
         """
         pairs = enumerate(thresholds)
-        starts = [_TautStart.of(self, number, preload, threshold, peak, unit) for number, threshold in pairs]
+        starts = [_taut_start(self, number, preload, threshold, peak, unit) for number, threshold in pairs]
         if reference and (not_positive := next((start for start in starts if start.stretch <= 0), None)):
             raise InputError(
-                f"{self.table.file}: where the preload {preload} is reached ({not_positive.place_in_words}), the "
+                f"{self.table.file}: where the preload {preload} is reached ({not_positive.lines}), the "
                 f"stretch is {not_positive.stretch:g}, not positive. Check the length of the specimen and the column "
                 "of displacements."
             )
@@ -247,7 +263,8 @@ class MeasuredRows:
         used = self.taken(np.flatnonzero(is_taut))
         references = np.array([[start.stretch] for start in starts])
         used = replace(used._counted_from(references, reference), dropped=(*self.dropped, *dropped))
-        return used.with_step(*(start.sentence(preload) for start in starts))
+        reached = f"where the preload {preload} is reached"
+        return used.with_step(*(f"{COUNTED_FROM} {start.stretch:.6g}, {reached} {start.lines}" for start in starts))
 
 
 def labelled(labels: Sequence[str], texts: Sequence[str]) -> list[str]:
@@ -257,64 +274,36 @@ def labelled(labels: Sequence[str], texts: Sequence[str]) -> list[str]:
     return [f"{label}: {text}" for label, text in zip(labels, texts, strict=True) if text]
 
 
-@dataclass(frozen=True)
-class _TautStart:
+class _TautStart(NamedTuple):
     """From which row on an axis is taut, the stretch there, and where that is in words."""
 
     row: int
     stretch: float
-    place_in_words: str
-
-    @classmethod
-    def of(
-        cls, measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int, unit: StressUnit
-    ) -> _TautStart:
-        """Return where the stress of that number reaches a threshold on the way to a row."""
-        table, stretch, size = measured.table, measured.stretch[number], np.abs(measured.stress[number])
-        is_loaded = size[: peak + 1] >= threshold
-        if not is_loaded.any():
-            raise InputError(
-                f"{table.file}: the preload {preload} is not reached: the largest stress is "
-                f"{unit.written(size[: peak + 1].max())}, and the preload is {unit.written(threshold)}. Give a lower "
-                "one, and check the units of force and area."
-            )
-        slack = np.flatnonzero(~is_loaded)
-        slack = slack[slack < np.flatnonzero(is_loaded)[-1]]
-        if len(slack):
-            row = int(slack[-1]) + 1
-            share = (threshold - size[row - 1]) / (size[row] - size[row - 1])
-            reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
-            words = f"between {table.counted}s {table.lines[row - 1]} and {table.lines[row]}"
-            start = cls(row, float(reference), words)
-        else:
-            words = (
-                f"in {table.counted} {table.lines[0]}, the first, where the stress is already {unit.written(size[0])}"
-            )
-            start = cls(0, float(stretch[0]), words)
-        return start
-
-    def sentence(self, preload: str) -> str:
-        """Return the sentence about this step."""
-        return f"{COUNTED_FROM} {self.stretch:.6g}, where the preload {preload} is reached {self.place_in_words}"
+    lines: str
 
 
-@dataclass(frozen=True)
-class Cycle:
-    """Rows of one cycle, counted from 0: from ``start`` up to ``stop``, turning at ``peak``.
-
-    Loading is the direction in which the cycle first goes, tension or compression.
-    """
-
-    label: str
-    start: int
-    peak: int
-    stop: int
-
-    def rows(self, branch: str | None = None) -> NDArray[np.intp]:
-        """Return its rows, or those of one branch; both branches have the turning point."""
-        start = self.peak if branch == "unloading" else self.start
-        stop = self.peak + 1 if branch == "loading" else self.stop
-        return np.arange(start, stop)
+def _taut_start(
+    measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int, unit: StressUnit
+) -> _TautStart:
+    """Return where the stress of that number reaches a threshold on the way to a row."""
+    table, stretch, size = measured.table, measured.stretch[number], np.abs(measured.stress[number])
+    is_loaded = size[: peak + 1] >= threshold
+    if not is_loaded.any():
+        raise InputError(
+            f"{table.file}: the preload {preload} is not reached: the largest stress is "
+            f"{unit.written(size[: peak + 1].max())}, and the preload is {unit.written(threshold)}. Give a lower one, "
+            "and check the units of force and area."
+        )
+    slack = np.flatnonzero(~is_loaded)
+    slack = slack[slack < np.flatnonzero(is_loaded)[-1]]
+    if not len(slack):
+        words = f"in {table.counted} {table.lines[0]}, the first, where the stress is already {unit.written(size[0])}"
+        return _TautStart(0, float(stretch[0]), words)
+    row = int(slack[-1]) + 1
+    share = (threshold - size[row - 1]) / (size[row] - size[row - 1])
+    reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
+    words = f"between {table.counted}s {table.lines[row - 1]} and {table.lines[row]}"
+    return _TautStart(row, float(reference), words)
 
 
 def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
