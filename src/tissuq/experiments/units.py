@@ -66,8 +66,10 @@ LARGEST_POWER = 12
 """Exponent of ten before a unit, at most."""
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
-MASSES = ("g", "kg", "lb")
-"""Units of mass that are written where units of force are meant."""
+MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf"}
+MASSES |= dict.fromkeys(["gram", "grams"], "gf") | dict.fromkeys(["kilogram", "kilograms"], "kgf")
+MASSES |= dict.fromkeys(["lbs", "pound", "pounds"], "lbf")
+"""Units of mass that are written where units of force are meant, and these."""
 
 OF_LETTERS = {
     "мм": "mm", "см": "cm", "м": "m", "мкм": "um", "нм": "nm",
@@ -217,8 +219,8 @@ class Quantity:
         0.001
         """
         factor = self.factor_or_none(text)
-        if factor is None and self.name == "force" and text in MASSES:
-            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {text}f.")
+        if factor is None and self.name == "force" and (force := MASSES.get(text.lower())):
+            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {force}.")
         if factor is None and self.name == LENGTH.name and PIXELS.factor_or_none(text):
             raise InputError(
                 f"'{text}' is no length. A distance between marks in pixels is read as --column length=NAME, with the "
@@ -326,7 +328,7 @@ SYMBOLS = frozenset().union(*(kind.factors for kind in (LENGTH, PIXELS, ANGLE, F
     "Hz", "K", "C", "F", "V", "mV", "percent", "pct",
 }  # fmt: skip
 """Units of quantities of any kind."""
-WORDS = {unit.replace("µ", "u").replace("μ", "u") for unit in (*SPELLINGS, *STRAIN_UNITS) if len(unit) > 1}
+WORDS = {unit.replace("µ", "u").replace("μ", "u") for unit in (*SPELLINGS, *STRAIN_UNITS, *MASSES) if len(unit) > 1}
 WORDS |= {f"{prefix}pascal{end}" for prefix in ("", "kilo", "mega") for end in ("", "s")}
 WORDS -= {"meter", "micrometer"}
 """Units in words, in small letters, but for those that instruments are called, too."""

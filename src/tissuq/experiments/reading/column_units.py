@@ -49,7 +49,7 @@ def factor_of(
         if in_file is not None and in_file != factor:
             raise _says_another(table, column, option, unit, declared)
         return factor, f"{unit} (as given)"
-    proposed = f"{declared}f" if quantity is FORCE and declared in units.MASSES else quantity.unit
+    proposed = units.MASSES.get(declared.lower(), quantity.unit) if quantity is FORCE else quantity.unit
     hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
     if not declared:
         raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")

@@ -68,7 +68,7 @@ class Load:
                 f"preload must be a positive force or stress with its unit, such as '0.05 N', not '{preload}'."
             )
         quantities = [self.divided] if self.divided else [FORCE, FORCE_PER_WIDTH]
-        if unit not in units.MASSES and all(quantity.factor_or_none(unit) is None for quantity in quantities):
+        if unit.lower() not in units.MASSES and all(quantity.factor_or_none(unit) is None for quantity in quantities):
             return number * units.stress_unit(unit).to_mpa
         if self.divided is None:
             raise InputError(f"preload '{preload}' is a force, but the file gives stresses; give it as a stress.")
