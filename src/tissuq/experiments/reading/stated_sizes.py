@@ -13,7 +13,7 @@ from tissuq.experiments.reading.headings import Heading, dimensions_named, headi
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.side_by_side import TestBeside
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.table import Table, padded
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import AREA, LENGTH, Quantity, looks_like_unit
 
@@ -136,8 +136,11 @@ def names_of_specimen(
 def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     """Yield what lines above the table state: ``Width : 5 mm``, ``"Probendicke";1,55;"mm"``, or less clear ones."""
     is_of_one = not table.number and not any(map(is_of_specimens, table.quantities))
-    for line, text in table.head:
+    for position, (line, text) in enumerate(table.head):
         text, source = text.lstrip("# "), f"in line {line}"
+        beneath = (split(later.lstrip("# "), table.separator) for _, later in table.head[position + 1 : position + 3])
+        if any(_are_names_of(row, split(text, table.separator)) for row in beneath):
+            continue
         if several := _sizes_in_line(text, table.separator):
             for name, values in several.items():
                 are_measured_again = is_of_one and not test and not _are_named(values, table)
@@ -210,6 +213,17 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
             yield from _sizes(Heading(quantity, unit), value, source, f"{name}: {value}", measurement)
 
 
+def _is_size(name: Heading) -> bool:
+    """Tell whether a heading is of a size of specimens, or of one of its measurements."""
+    return bool(dimensions_named(numbered(name.quantity)[0]))
+
+
+def _are_names_of(row: list[str], cells: Sequence[str]) -> bool:
+    """Tell whether cells name sizes, each over a number in a row beneath them: ``Width 1 (mm)`` states none there."""
+    sizes = [column for column, cell in enumerate(cells) if _is_size(heading(cell))]
+    return bool(sizes) and all(map(NUMBER.fullmatch, padded(row, len(cells))[sizes[0] : sizes[-1] + 1]))
+
+
 def _only_specimen(table: Table) -> set[str]:
     """Return the name of the specimen in a table of one row above the measurements; nothing where there are more."""
     is_beneath, names = False, set[str]()
@@ -217,7 +231,7 @@ def _only_specimen(table: Table) -> set[str]:
         cells = split(text.lstrip("# "), table.separator)
         if any(map(NUMBER.fullmatch, cells)):
             names |= {plain(cells[0])} if is_beneath else set()
-        elif any(dimensions_named(heading(cell).quantity) for cell in cells[1:]):
+        elif any(map(_is_size, map(heading, cells[1:]))):
             is_beneath = True
     return names if len(names) == 1 else set()
 
@@ -234,8 +248,7 @@ def _of_specimens(
     for line, text in lines:
         cells = split(text.lstrip("# "), table.separator)
         if not any(map(NUMBER.fullmatch, cells)):
-            named = {k: heading(cell) for k, cell in enumerate(cells) if k}
-            headings = {k: name for k, name in named.items() if dimensions_named(numbered(name.quantity)[0])}
+            headings = {k: name for k, name in enumerate(map(heading, cells)) if _is_size(name)}
             units = {k: cells[k].strip("[]()") for k in names if k < len(cells)}
             if not headings and any(kind.factor_or_none(unit) for unit in units.values() for kind in (LENGTH, AREA)):
                 names = {k: Heading(name.quantity, units.get(k) or name.unit) for k, name in names.items()}
