@@ -18,13 +18,7 @@ from tissuq.experiments.reading.column_checks import (
     check_together,
     with_types,
 )
-from tissuq.experiments.reading.headings import (
-    AXES,
-    COMPONENTS,
-    contents_of,
-    on_axis,
-    plain,
-)
+from tissuq.experiments.reading.headings import AXES, COMPONENTS, contents_of, on_axis, plain
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -43,12 +37,7 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
-__all__ = [
-    "about_stress",
-    "choose_columns",
-    "find_column",
-    "mapping_of_each_stress",
-]
+__all__ = ["about_stress", "choose_columns", "find_column", "mapping_of_each_stress"]
 
 
 def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:

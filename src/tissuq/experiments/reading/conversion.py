@@ -26,12 +26,7 @@ from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE
 
-__all__ = [
-    "as_columns",
-    "measured_rows",
-    "stress_measure_of",
-    "with_engineering_stress",
-]
+__all__ = ["as_columns", "measured_rows", "stress_measure_of", "with_engineering_stress"]
 
 LONG = "engineering stress of "
 """How names of several stresses begin; what is said of each of them begins with the axis alone."""

@@ -11,16 +11,7 @@ from tissuq.experiments.reading.stated_sizes import StatedSize
 from tissuq.experiments.reading.uneven_stress import Tube
 from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
-__all__ = [
-    "SECTIONS",
-    "Dimension",
-    "Dimensions",
-    "agree",
-    "in_words",
-    "quantity_of",
-    "sections_of",
-    "tube_of",
-]
+__all__ = ["SECTIONS", "Dimension", "Dimensions", "agree", "in_words", "quantity_of", "sections_of", "tube_of"]
 
 SHOWN = 3
 """Number of other sizes that a message shows."""

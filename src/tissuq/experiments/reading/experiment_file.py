@@ -18,12 +18,7 @@ from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
-from tissuq.experiments.reading.conversion import (
-    as_columns,
-    measured_rows,
-    stress_measure_of,
-    with_engineering_stress,
-)
+from tissuq.experiments.reading.conversion import as_columns, measured_rows, stress_measure_of, with_engineering_stress
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
@@ -59,14 +54,7 @@ from tissuq.experiments.reading.stated_mode import (
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
 
-__all__ = [
-    "Reading",
-    "read",
-    "read_experiment",
-    "read_file",
-    "read_rows",
-    "table_of",
-]
+__all__ = ["Reading", "read", "read_experiment", "read_file", "read_rows", "table_of"]
 
 
 @dataclass(frozen=True, eq=False)

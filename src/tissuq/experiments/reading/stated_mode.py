@@ -10,13 +10,7 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_modes
-from tissuq.experiments.reading.headings import (
-    NEXT_WORD,
-    STRESS_NOUNS,
-    heading,
-    measure_in,
-    on_lettered_axis,
-)
+from tissuq.experiments.reading.headings import NEXT_WORD, STRESS_NOUNS, heading, measure_in, on_lettered_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS
 from tissuq.experiments.reading.table import Table

@@ -164,8 +164,7 @@ def find_tests_in_file(
     tables = read_tables(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
     path = tables[0].file if is_data_frame(path) else path
     has_sheets = len({table.sheet for table in tables}) > 1
-    tests = list[TestInFile]()
-    unrecognised, unreadable = list[tuple[Table, InputError]](), list[tuple[Table, InputError]]()
+    tests, refused = list[TestInFile](), list[tuple[Table, InputError, float, str]]()
     for table in tables:
         selection, names = options.copy(), list[str]()
         if has_sheets:
@@ -178,7 +177,7 @@ def find_tests_in_file(
             rows = only_rows(table, columns_only(table, options.get("only")))
             of_table = _side_by_side(rows, path, selection, names)
         except InputError as error:
-            unrecognised.append((table, error))
+            refused.append((table, error, MIN_SHARE_OF_TEST, "no columns of a test are recognised in it."))
             continue
         try:
             tests += [
@@ -187,12 +186,12 @@ def find_tests_in_file(
                 for test in _of_one_table(rows, path, selection, names, columns, is_only_test=not is_one_of_several)
             ]
         except InputError as error:
-            unreadable.append((table, error))
+            refused.append((table, error, 1 / LENGTH_RATIO, "it is short, and cannot be read as a test."))
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
-    for refused, share in ((unrecognised, MIN_SHARE_OF_TEST), (unreadable, 1 / LENGTH_RATIO)):
-        for table, refusal in refused:
-            if len(table.rows) >= share * longest:
-                raise _may_be_test(refusal, tests) if tests else refusal
+    refused.sort(key=lambda item: -item[2])
+    for table, why, share, _ in refused:
+        if len(table.rows) >= share * longest:
+            raise _may_be_test(why, tests) if tests else why
     longest = max((len(test.reading.recorded) for test in tests), default=0)
     of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
     tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
@@ -202,8 +201,7 @@ def find_tests_in_file(
     tests = [test for test, refusal in zip(tests, refusals, strict=True) if not refusal]
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
-    notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in unrecognised]
-    notes += [f"{table.file} is left out: it is short, and cannot be read as a test." for table, _ in unreadable]
+    notes += [f"{table.file} is left out: {what}" for table, _, _, what in refused]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
 
 
