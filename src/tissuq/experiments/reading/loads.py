@@ -10,7 +10,7 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
-from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
+from tissuq.experiments.reading.dimensions import Dimensions, in_words
 from tissuq.experiments.reading.measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import FIRST_ROW
@@ -94,7 +94,7 @@ def stress_of(
         return Load(values * scale, _unit_shown(options), source, scale=scale)
     if choice.load == "pressure":
         factor, unit_source = factor_of(table, choice.stress, PRESSURE, "force_unit", options)
-        tube, _ = tube_of(dimensions)
+        tube, _ = dimensions.tube
         source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
         scale = factor / tube.log_ratio
         return Load(

@@ -192,9 +192,10 @@ def find_tests_in_file(
     for table, why, share, _ in refused:
         if len(table.rows) >= share * longest:
             raise _may_be_test(why, tests) if tests else why
-    longest = max((len(test.reading.recorded) for test in tests), default=0)
-    of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
-    tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
+    counts = [len(test.reading.recorded) for test in tests]
+    are_few = [count <= SHORT_TABLE and LENGTH_RATIO * count <= max(counts) for count in counts]
+    of_few_rows = [test.name for test, is_short in zip(tests, are_few, strict=True) if is_short]
+    tests = [test for test, is_short in zip(tests, are_few, strict=True) if not is_short]
     refusals = [other_label(test.reading.table, test.reading.experiment, options.get("only")) for test in tests]
     if refusals and all(refusals):
         raise InputError(refusals[0])
@@ -203,11 +204,6 @@ def find_tests_in_file(
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
     notes += [f"{table.file} is left out: {what}" for table, _, _, what in refused]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
-
-
-def _are_few(rows: int, longest: int) -> bool:
-    """Tell whether so many rows are no test beside the longest of their file."""
-    return rows <= SHORT_TABLE and LENGTH_RATIO * rows <= longest
 
 
 def _may_be_test(refusal: InputError, tests: Sequence[TestInFile]) -> InputError:
