@@ -332,3 +332,16 @@ def test_names_over_a_row_of_sizes_state_none_and_the_first_of_them_counts(tmp_p
     data = tq.read(path)
     assert data.stretch[-1] == pytest.approx(1 + 11 / 20)
     assert data.stress[-1] == pytest.approx(1.1 / area)
+
+
+@pytest.mark.parametrize("separator", ["\t", ";", ","])
+def test_a_unit_stands_between_the_name_of_a_size_and_its_value(tmp_path, separator):
+    path = tmp_path / "test.csv"
+    head = [
+        separator.join(cells) for cells in (("Width", "mm", "5"), ("Thickness", "um", "2000"), ("Length", "cm", "2"))
+    ]
+    rows = [f"{k}{separator}{k / 10:g}" for k in range(12)]
+    path.write_text("\n".join([*head, f"Displacement [mm]{separator}Force [N]", *rows]) + "\n", encoding="utf-8")
+    data = tq.read(path)
+    assert data.stretch[-1] == pytest.approx(1 + 11 / 20)
+    assert data.stress[-1] == pytest.approx(1.1 / 10)

@@ -182,8 +182,8 @@ def _of_several(
 
 
 def _of_words(name: str, number: str, unit: str, source: str, measurement: str) -> list[StatedSize]:
-    """Return the sizes that a name, and what follows it, state; the unit is with one of them, or comes next."""
-    for text in (f"{number} {unit}", number):
+    """Return the sizes that a name, and what follows it, state; the unit is with one of them, or beside the number."""
+    for text in (f"{number} {unit}", number, f"{unit} {number}"):
         value = DEVIATION.sub("", text)
         if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}", measurement):
             return sizes
