@@ -7,7 +7,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.experiments import datasets
-from tissuq.experiments.reading.events import ends_of_rests, find_holds, find_rupture
+from tissuq.experiments.reading.disturbances import ends_of_rests, find_holds, find_rupture
 
 LAWS = {
     "neo-hookean": lambda share: 1.4 * share - (1.4 * share) ** 2 / 3,

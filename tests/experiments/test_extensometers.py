@@ -84,7 +84,7 @@ def test_distances_in_pixels_that_begin_under_load_are_asked_about_and_the_advic
     columns = DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
     path.write_text("\n".join(["Gauge length: 20 mm", "Marks (px);Force (N)", *map("{:.9f};{:.9f}".format, *columns)]))
     with pytest.raises(
-        InputError, match=r"with 3\d% of the largest load. Give the undeformed distance in pixels: --length"
+        InputError, match=r"with 3\d % of the largest load. Give the undeformed distance in pixels: --length"
     ):
         tq.read(path, area="10 mm2")
     np.testing.assert_allclose(tq.read(path, area="10 mm2", length="812 px").stretch, stretch, rtol=1e-9)

@@ -105,6 +105,8 @@ def test_forces_are_read_in_their_unit(tmp_path, unit, factor):
     ("text", "options", "words"),
     [
         ("Disp [mm],Load [g]\n", {}, "column 'Load [g]': 'g' is a mass, not a force; if the unit of force is meant"),
+        ("Disp [mm],Load (grams)\n", {}, "write gf. To say it yourself, give force_unit (--force-unit gf)"),
+        ("Disp [mm],Load\nmm,Pounds\n", {}, "write lbf. To say it yourself, give force_unit (--force-unit lbf)"),
         ("Disp [mm],Load\n", {}, "column 'Load': the file states no unit of force; give force_unit (--force-unit N)"),
         ("Disp,Load [N]\n", {}, "states no unit of length; give displacement_unit (--displacement-unit mm)"),
         ("Disp [mm],Load [N]\n", {"force_unit": "kN"}, "force_unit='kN' is given, but the file says 'N'"),

@@ -123,3 +123,14 @@ def test_a_column_that_only_its_unit_tells_is_named_first_with_how_to_say_anothe
         warnings.simplefilter("error")
         test = tq.read(path, columns=columns)
     np.testing.assert_allclose(test.stretch, L, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["Stress x 10^-3", "Stress × 10⁻³", "stress*10^3", "Stress x10-3", "Stress x 1e-3"])
+def test_a_power_of_ten_in_a_name_is_asked_about(tmp_path, name):
+    """It may be of the unit or of the numbers: a thousand times as much either way."""
+    path = tmp_path / "test.csv"
+    path.write_text(f"stretch,{name} (MPa)\n" + "".join(f"{1 + k / 10},{k}\n" for k in range(6)), encoding="utf-8")
+    with pytest.raises(tq.InputError, match="a multiple by a power of ten, which belongs into its unit"):
+        tq.read(path)
+    path.write_text(path.read_text(encoding="utf-8").replace(f"{name} (MPa)", "Stress (10^-3 MPa)"), encoding="utf-8")
+    assert tq.read(path).stress[-1] == pytest.approx(5e-3)

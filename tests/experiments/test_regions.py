@@ -9,7 +9,7 @@ import tissuq as tq
 from planted import CLEAN, LAWS, PLANTED, STIFFENING, rates
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
-from tissuq.experiments.reading.load_cell import find_drift, find_outliers, find_saturation, staircase_of, step_of
+from tissuq.experiments.reading.disturbances import find_drift, find_outliers, find_saturation, staircase_of, step_of
 
 ALL_LAWS = [*LAWS, *STIFFENING]
 WAY = np.linspace(0, 1, 121)

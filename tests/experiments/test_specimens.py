@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tissuq import InputError
-from tissuq.experiments.reading.several_files import find_tests, read_column
+from tissuq.experiments.reading.specimens_in_files import find_tests, read_column
 
 ROWS = ["0.9,-3.5", "1.1,2.8", "1.2,5"]
 

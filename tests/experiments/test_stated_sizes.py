@@ -310,3 +310,38 @@ def test_all_sizes_that_are_missing_are_asked_for_at_once_and_the_advice_reads_t
     assert "--length" in str(refusal.value)
     assert "--area" not in str(refusal.value)
     np.testing.assert_allclose(tq.read(path, area="10 mm2", length="20 mm").stress, STRESS, rtol=1e-6)
+
+
+@pytest.mark.parametrize("start", ["", "# "])
+@pytest.mark.parametrize(
+    ("names", "units", "values", "area"),
+    [
+        ("Width;Thickness;Length", "mm;mm;mm", "5;2;20", 10.0),
+        ("Width (mm);Thickness (mm);Length (mm)", None, "5;2;20", 10.0),
+        ("Area (mm2);Length (mm)", None, "10;20", 10.0),
+        ("Width 1 (mm);Width 2 (mm);Thickness (mm);Length (mm)", None, "5;5,2;2;20", 10.2),
+        ("Specimen;Width 1 (mm);Width 2 (mm);Thickness 1 (mm);Length (mm)", None, "S1;5;5,2;2;20", 10.2),
+    ],
+)
+def test_names_over_a_row_of_sizes_state_none_and_the_first_of_them_counts(tmp_path, start, names, units, values, area):
+    """The 1 in the name of a first width is no millimetre."""
+    path = tmp_path / "test.csv"
+    head = [start + line for line in (names, units, values) if line]
+    rows = [f"{k};{k / 10:g}".replace(".", ",") for k in range(12)]
+    path.write_text("\n".join([*head, "Displacement [mm];Force [N]", *rows]) + "\n", encoding="utf-8")
+    data = tq.read(path)
+    assert data.stretch[-1] == pytest.approx(1 + 11 / 20)
+    assert data.stress[-1] == pytest.approx(1.1 / area)
+
+
+@pytest.mark.parametrize("separator", ["\t", ";", ","])
+def test_a_unit_stands_between_the_name_of_a_size_and_its_value(tmp_path, separator):
+    path = tmp_path / "test.csv"
+    head = [
+        separator.join(cells) for cells in (("Width", "mm", "5"), ("Thickness", "um", "2000"), ("Length", "cm", "2"))
+    ]
+    rows = [f"{k}{separator}{k / 10:g}" for k in range(12)]
+    path.write_text("\n".join([*head, f"Displacement [mm]{separator}Force [N]", *rows]) + "\n", encoding="utf-8")
+    data = tq.read(path)
+    assert data.stretch[-1] == pytest.approx(1 + 11 / 20)
+    assert data.stress[-1] == pytest.approx(1.1 / 10)

@@ -3,7 +3,9 @@ import sys
 
 import pytest
 
+import tissuq as tq
 from tissuq.errors import InputError
+from tissuq.experiments import units
 from tissuq.experiments.units import FORCE, LENGTH, looks_like_unit, strain_factor, stress_unit
 
 MPA = {
@@ -105,6 +107,38 @@ def test_an_unknown_strain_unit_is_refused():
 @pytest.mark.parametrize("text", ["[anything]", "(kPa)", "N/mm²", "mm/min", "s", "%", "°C", "1/s", "-", "1", ""])
 def test_cells_of_a_units_row_look_like_units(text):
     assert looks_like_unit(text)
+
+
+@pytest.mark.parametrize(
+    "quantity", [units.LENGTH, units.FORCE, units.TORQUE, units.PRESSURE, units.ANGLE, units.TIME], ids=lambda q: q.name
+)
+def test_every_unit_that_is_converted_looks_like_one(quantity):
+    assert all(map(looks_like_unit, quantity.factors))
+
+
+@pytest.mark.parametrize(
+    ("cells", "stretch", "stress"),
+    [
+        ("microstrain,kilopascals", 1.001, 2e-3),
+        ("µε,kPa", 1.001, 2e-3),
+        ("permille,Megapascal", 2.0, 2.0),
+        ("Millistrain,N/mm2", 2.0, 2.0),
+    ],
+)
+def test_a_row_of_units_in_words_stands_beneath_the_names(tmp_path, cells, stretch, stress):
+    path = tmp_path / "test.csv"
+    path.write_text(f"strain,stress\n{cells}\n0,0\n500,1\n1000,2\n", encoding="utf-8")
+    data = tq.read(path)
+    assert data.stretch[-1] == pytest.approx(stretch)
+    assert data.stress[-1] == pytest.approx(stress)
+
+
+def test_forces_and_displacements_have_units_in_words(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text("Displacement,Force\nmillimeters,Millinewtons\n0,0\n0.5,1\n1,2\n", encoding="utf-8")
+    data = tq.read(path, length="10 mm", area="2 mm2")
+    assert data.stretch[-1] == pytest.approx(1.1)
+    assert data.stress[-1] == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize("text", ["stress", "Time", "lambda", "A17", "n/a", "0.5", "--", "start"])

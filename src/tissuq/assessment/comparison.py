@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.sensitivity import SCALE_FACTORS
 from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
-from tissuq.experiments.checked_arrays import FOUR_DIGITS, agree
+from tissuq.experiments.checked_arrays import FOUR_DIGITS, agree, headed, in_unit
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.marginal import Marginal, blended

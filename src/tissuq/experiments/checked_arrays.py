@@ -1,22 +1,36 @@
-"""Arrays of stretches and stresses as people give them: of numbers, with units or not, checked once."""
+"""Arrays of stretches and stresses as people give them, checked once, and tables of stresses in the unit they read."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.pint_units import is_quantity, unit_of
-from tissuq.experiments.units import stress_unit as stress_unit_of
+from tissuq.experiments.units import StressUnit, stress_unit
 
-__all__ = ["FOUR_DIGITS", "LARGE_STRETCH", "agree", "check_no_percent", "checked", "checked_points", "in_mpa"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "FOUR_DIGITS",
+    "LARGE_STRETCH",
+    "agree",
+    "check_no_percent",
+    "checked",
+    "checked_points",
+    "headed",
+    "in_mpa",
+    "in_unit",
+    "stress_in_mpa",
+]
 
 FloatArray = NDArray[np.float64]
-
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken, or percent are meant."""
 LEAST_PERCENT = 30.0
@@ -64,9 +78,32 @@ def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
 def in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
     """Return stresses in MPa, and the unit in which people want to read them."""
     if is_quantity(stress):
-        return _magnitude(stress, "megapascal"), stress_unit_of(unit or unit_of(stress)).name
-    shown = stress_unit_of(unit or "MPa")
+        return _magnitude(stress, "megapascal"), stress_unit(unit or unit_of(stress)).name
+    shown = stress_unit(unit or "MPa")
     return _numbers("stress", stress) * shown.to_mpa, shown.name
+
+
+def stress_in_mpa(stress: Any) -> Any:
+    """Return a stress in MPa that is a text with its unit or a quantity of pint; anything else as it is.
+
+    Raises
+    ------
+    InputError
+        When a text is a number without a unit, or its unit or that of a quantity is none of stress.
+
+    Examples
+    --------
+    >>> stress_in_mpa("0.02 kPa"), stress_in_mpa(0.5), stress_in_mpa("unknown")
+    (2e-05, 0.5, 'unknown')
+    """
+    if is_quantity(stress):
+        return stress.magnitude * stress_unit(unit_of(stress)).to_mpa
+    number, unit = number_and_unit(stress) if isinstance(stress, str) else (None, "")
+    if number is None:
+        return stress
+    if not unit:
+        raise InputError(f"'{stress}' has no unit: write it with one, such as '{stress} kPa', or as a number of MPa.")
+    return number * stress_unit(unit).to_mpa
 
 
 def _magnitude(values: Any, unit: str) -> Any:
@@ -100,3 +137,27 @@ def checked(name: str, values: Any, columns: Sequence[str]) -> FloatArray:
             )
     array.flags.writeable = False
     return array
+
+
+def in_unit(table: pd.DataFrame, columns: Sequence[str], unit: str) -> pd.DataFrame:
+    """Return a table whose columns in MPa are in another unit of stress, which stands at the head of the columns.
+
+    Raises
+    ------
+    InputError
+        When it is no unit of stress.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> print(in_unit(pd.DataFrame({"stretch": [1.1], "low": [0.002]}), ["low"], "kPa"))
+    stresses in kPa  stretch  low
+    0                    1.1  2.0
+    """
+    shown = stress_unit(unit)
+    return headed(table.assign(**{name: table[name] / shown.to_mpa for name in columns}), shown)
+
+
+def headed(table: pd.DataFrame, unit: StressUnit) -> pd.DataFrame:
+    """Return a table with the unit of its stresses at the head of its columns, as their name."""
+    return table.rename_axis(columns=f"stresses in {unit.name}")

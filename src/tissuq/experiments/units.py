@@ -6,12 +6,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, prod
-from typing import Any
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import number_and_unit, sides_and_unit
-from tissuq.experiments.pint_units import is_quantity, stress_factor, unit_of
-from tissuq.experiments.unit_spellings import SPELLINGS, SYMBOLS, in_latin
+from tissuq.experiments.pint_units import stress_factor
 
 __all__ = [
     "ANGLE",
@@ -31,7 +29,6 @@ __all__ = [
     "looks_like_unit",
     "measured_in",
     "strain_factor",
-    "stress_in_mpa",
     "stress_unit",
     "stress_units_in",
 ]
@@ -55,12 +52,10 @@ COMMON_STRESS_UNITS = {
     "psi": 0.006894757293168361,
 }
 PASCALS = {unit.lower(): unit for unit in COMMON_STRESS_UNITS if unit.endswith("Pa")}
-
 STRAIN_UNITS = dict.fromkeys(["", "1", "-", "mm/mm"], 1.0)
 STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
 STRAIN_UNITS |= dict.fromkeys(["‰", "permille", "mε", "millistrain"], 1e-3)
 STRAIN_UNITS |= dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
-
 POWER_OF_TEN = re.compile(
     r"(?:10\s*(?:(?:\^|\*\*)\s*\(?(?P<power>[+-]?\d+)\)?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+))|1[eE](?P<digits>[+-]?\d+))"
     r"\s*[*·⋅]?\s*(?P<unit>[^\W\d].*)"
@@ -71,8 +66,29 @@ LARGEST_POWER = 12
 """Exponent of ten before a unit, at most."""
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
-MASSES = ("g", "kg", "lb")
-"""Units of mass that are written where units of force are meant."""
+MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf"}
+MASSES |= dict.fromkeys(["gram", "grams"], "gf") | dict.fromkeys(["kilogram", "kilograms"], "kgf")
+MASSES |= dict.fromkeys(["lbs", "pound", "pounds"], "lbf")
+"""Units of mass that are written where units of force are meant, and these."""
+
+OF_LETTERS = {
+    "мм": "mm", "см": "cm", "м": "m", "мкм": "um", "нм": "nm",
+    "Н": "N", "кН": "kN", "мН": "mN", "мкН": "uN", "МН": "MN", "н": "N", "кгс": "kgf", "гс": "gf", "кГ": "kgf",
+    "кг": "kg", "г": "g", "Па": "Pa", "кПа": "kPa", "МПа": "MPa", "ГПа": "GPa", "гПа": "hPa", "мПа": "mPa",
+    "бар": "bar", "мбар": "mbar", "атм": "atm", "с": "s", "сек": "s", "мс": "ms", "мин": "min", "ч": "h", "Гц": "Hz",
+    "рад": "rad", "мрад": "mrad", "град": "deg",
+    "毫米": "mm", "厘米": "cm", "米": "m", "微米": "um", "牛": "N", "牛顿": "N", "千牛": "kN", "毫牛": "mN",
+    "帕": "Pa", "千帕": "kPa", "兆帕": "MPa", "秒": "s", "分钟": "min", "度": "deg", "弧度": "rad",
+}  # fmt: skip
+"""Units in Cyrillic and Chinese letters, as the International System of Units has them."""
+MERCURY = re.compile(r"мм\.?\s*рт\.?\s*ст\.?")
+WORD = re.compile(r"[\u0400-\u04ff\u4e00-\u9fff]+")
+SPELLINGS = dict.fromkeys(["micron", "microns", "micrometer", "micrometre"], "um") | {"inch": "in", "inches": "in"}
+SPELLINGS |= {"lbf": "lbf", "kgf": "kgf", "newton": "N", "newtons": "N", "millimeter": "mm", "millimetre": "mm"}
+SPELLINGS |= {"millimeters": "mm", "millimetres": "mm", "centimeter": "cm", "centimetre": "cm", "centimeters": "cm"}
+SPELLINGS |= {"centimetres": "cm", "meter": "m", "metre": "m", "meters": "m", "metres": "m", "micrometers": "um"}
+SPELLINGS |= {"micrometres": "um", "millinewton": "mN", "millinewtons": "mN", "kilonewton": "kN", "kilonewtons": "kN"}
+"""Units in other spellings, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -131,8 +147,8 @@ def stress_unit(text: str) -> StressUnit:
         raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
     if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
-    factor = COMMON_STRESS_UNITS.get(compact)
-    return StressUnit(PASCALS.get(name.lower(), name), stress_factor(in_latin(name)) if factor is None else factor)
+    factor, spelling = COMMON_STRESS_UNITS.get(compact), name.lower() if name.lower() in WORDS else in_latin(name)
+    return StressUnit(PASCALS.get(name.lower(), name), stress_factor(spelling) if factor is None else factor)
 
 
 def _without_power(unit: str) -> tuple[float, str]:
@@ -147,29 +163,6 @@ def _without_power(unit: str) -> tuple[float, str]:
 def _compact(unit: str) -> str:
     """Return a unit of stress without blanks and marks of powers, in Latin letters."""
     return re.sub(r"\s+|\^|\*\*", "", in_latin(unit)).replace("²", "2")
-
-
-def stress_in_mpa(stress: Any) -> Any:
-    """Return a stress in MPa that is a text with its unit or a quantity of pint; anything else as it is.
-
-    Raises
-    ------
-    InputError
-        When a text is a number without a unit, or its unit or that of a quantity is none of stress.
-
-    Examples
-    --------
-    >>> stress_in_mpa("0.02 kPa"), stress_in_mpa(0.5), stress_in_mpa("unknown")
-    (2e-05, 0.5, 'unknown')
-    """
-    if is_quantity(stress):
-        return stress.magnitude * stress_unit(unit_of(stress)).to_mpa
-    number, unit = number_and_unit(stress) if isinstance(stress, str) else (None, "")
-    if number is None:
-        return stress
-    if not unit:
-        raise InputError(f"'{stress}' has no unit: write it with one, such as '{stress} kPa', or as a number of MPa.")
-    return number * stress_unit(unit).to_mpa
 
 
 def strain_factor(text: str) -> float:
@@ -226,8 +219,8 @@ class Quantity:
         0.001
         """
         factor = self.factor_or_none(text)
-        if factor is None and self.name == "force" and text in MASSES:
-            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {text}f.")
+        if factor is None and self.name == "force" and (force := MASSES.get(text.lower())):
+            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {force}.")
         if factor is None and self.name == LENGTH.name and PIXELS.factor_or_none(text):
             raise InputError(
                 f"'{text}' is no length. A distance between marks in pixels is read as --column length=NAME, with the "
@@ -264,16 +257,26 @@ class Quantity:
 
 
 LENGTH = Quantity("length", "mm", {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4})
+
+
 PIXELS = Quantity("pixels", "px", dict.fromkeys(["px", "pixel", "pixels", "Pixel", "Pixels", "pix"], 1.0))
 """Distances in pictures, which are lengths only in proportion to another one."""
+
+
 ANGLE = Quantity("angle", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "degrees": pi / 180})
+
+
 AREA = Quantity("area", "mm2", {f"{unit}2": factor**2 for unit, factor in LENGTH.factors.items()})
+
+
 FORCE = Quantity(
     "force",
     "N",
     {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
     | {"cN": 1e-2, "dN": 0.1, "daN": 10.0, "hN": 100.0, "nN": 1e-9, "pN": 1e-12, "dyn": 1e-5},
 )
+
+
 FORCE_PER_WIDTH = Quantity(
     "force per width",
     "N/mm",
@@ -284,17 +287,29 @@ FORCE_PER_WIDTH = Quantity(
     },
 )
 """As of sheets and membranes, whose thickness makes it a stress."""
+
+
 TIME = Quantity("time", "s", {"s": 1.0, "sec": 1.0, "Sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0})
+
+
 RATE = Quantity(
     "rate",
     "1/s",
     {form.format(unit): 1 / factor for unit, factor in TIME.factors.items() for form in ("1/{}", "{}-1", "/{}")},
 )
+
+
 PRESSURES = {"mmHg": 133.322387415e-6, "mmhg": 133.322387415e-6, "cmH2O": 98.0665e-6, "mmH2O": 9.80665e-6}
+
+
 PRESSURES |= dict.fromkeys(["torr", "Torr"], 0.101325 / 760) | {"mbar": 1e-4, "bar": 0.1, "atm": 0.101325}
 """Conventional columns of mercury (13.5951 g/cm3) and water (1 g/cm3) under standard gravity, and multiples of the
 bar."""
+
+
 PRESSURE = Quantity("pressure", "MPa", PRESSURES | COMMON_STRESS_UNITS | {"kpa": 1e-3, "KPa": 1e-3})
+
+
 TORQUE = Quantity(
     "torque",
     "N mm",
@@ -306,6 +321,17 @@ TORQUE = Quantity(
     | {"nNm": 1e-6},
     ignored=r"[\s^.·⋅*-]",
 )
+
+
+SYMBOLS = frozenset().union(*(kind.factors for kind in (LENGTH, PIXELS, ANGLE, FORCE, TIME, PRESSURE, TORQUE))) | {
+    "mPa", "Mpa", "MPA", "mpa", "ksi", "Hg", "MN", "kp", "dyne", "lbF", "lb", "kg", "g", "micron", "nm", "inch", "ft",
+    "Hz", "K", "C", "F", "V", "mV", "percent", "pct",
+}  # fmt: skip
+"""Units of quantities of any kind."""
+WORDS = {unit.replace("µ", "u").replace("μ", "u") for unit in (*SPELLINGS, *STRAIN_UNITS, *MASSES) if len(unit) > 1}
+WORDS |= {f"{prefix}pascal{end}" for prefix in ("", "kilo", "mega") for end in ("", "s")}
+WORDS -= {"meter", "micrometer"}
+"""Units in words, in small letters, but for those that instruments are called, too."""
 
 
 def measured_in(unit: str) -> str:
@@ -324,13 +350,9 @@ def measured_in(unit: str) -> str:
     for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE, FORCE_PER_WIDTH, PIXELS):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
-    return (
-        "strain"
-        if compact and compact.lower() in STRAIN_UNITS
-        else "time"
-        if TIME.factor_or_none(compact.lower())
-        else ""
-    )
+    if compact and compact.lower() in STRAIN_UNITS:
+        return "strain"
+    return TIME.name if TIME.factor_or_none(compact.lower()) else ""
 
 
 def looks_like_unit(text: str) -> bool:
@@ -343,7 +365,7 @@ def looks_like_unit(text: str) -> bool:
         for symbol in re.split(r"(?:[\s·*/.^%°⁻²³-]|(?<!H)\d)+", text.replace("µ", "u").replace("μ", "u"))
         if symbol
     ]
-    return bool(symbols) and all(symbol in SYMBOLS for symbol in symbols)
+    return bool(symbols) and all(symbol in SYMBOLS or symbol.lower() in WORDS for symbol in symbols)
 
 
 def stress_units_in(text: str) -> list[str]:
@@ -356,3 +378,16 @@ def stress_units_in(text: str) -> list[str]:
     """
     words = re.findall(r"[^\W\d_]+(?:/[^\W\d_]+[2²])?", in_latin(text.replace("^", "")))
     return [word for word in words if word in COMMON_STRESS_UNITS or word.lower() in PASCALS.keys() - {"pa"}]
+
+
+def in_latin(unit: str) -> str:
+    """Return a unit with its parts in Cyrillic or Chinese letters in Latin ones, others as they are.
+
+    Examples
+    --------
+    >>> in_latin("Н/мм2"), in_latin("кПа"), in_latin("мм рт. ст."), in_latin("mm")
+    ('N/mm2', 'kPa', 'mmHg', 'mm')
+    """
+    if unit.isascii():
+        return unit
+    return WORD.sub(lambda word: OF_LETTERS.get(word[0], word[0]), MERCURY.sub("mmHg", unit))

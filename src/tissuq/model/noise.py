@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.checked_arrays import stress_in_mpa
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.smoothing import scatter, smoothed
-from tissuq.experiments.units import stress_in_mpa
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 from tissuq.registry import find, plugins, variants

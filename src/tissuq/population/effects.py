@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.headed_tables import headed
+from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.units import StressUnit
 from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, interval
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.drawing.panels import Panels, panels
-from tissuq.experiments.headed_tables import headed, in_unit
+from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.parameters.checks import check_probability

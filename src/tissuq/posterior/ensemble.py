@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.stability import measured_range
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
-from tissuq.experiments.headed_tables import headed
+from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, StretchMaterial, stress_basis

@@ -19,8 +19,8 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.drawing.panels import panels
 from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.checked_arrays import in_unit
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.headed_tables import in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements

@@ -18,8 +18,8 @@ from tissuq.assessment.comparison import scores_of
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
 from tissuq.errors import ModelError
+from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.marginal import Marginal

@@ -21,7 +21,7 @@ from tissuq.experiments.checked_arrays import FOUR_DIGITS, agree
 from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.headings import heading, plain
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.several_specimens import SeveralSpecimens, check_one_specimen, only_rows
+from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, check_one_specimen, only_rows
 from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.units import PRESSURE, measured_in, stress_unit

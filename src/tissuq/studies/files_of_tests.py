@@ -53,7 +53,7 @@ def resolve(file: Path) -> Path:
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
     """Return the files that were given; of a folder those in it that may hold measurements."""
-    from tissuq.experiments.reading.several_files import SUFFIXES
+    from tissuq.experiments.reading.specimens_in_files import SUFFIXES
 
     files: list[Path] = []
     for path in paths:

@@ -14,8 +14,8 @@ from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import pairs_of, share
 
 if TYPE_CHECKING:
-    from tissuq.experiments.reading.covariates import CovariateTable
     from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.reading.specimens_in_files import CovariateTable
 
 __all__ = ["PopulationSettings"]
 
@@ -87,7 +87,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
 
     def sources(self, folder: Path = Path()) -> dict[str, list[Path]]:
         """Return the files of every specimen; one file alone where a column in it names them."""
-        from tissuq.experiments.reading.several_files import find_tests
+        from tissuq.experiments.reading.specimens_in_files import find_tests
 
         if self.specimen is None:
             return find_tests([folder / file for file in self.files], but=self.covariates and folder / self.covariates)
@@ -99,7 +99,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
 
     def covariate_table(self, specimens: Collection[str], folder: Path = Path()) -> CovariateTable | None:
         """Read the covariates of specimens, if there are any; relative files lie in ``folder``."""
-        from tissuq.experiments.reading.covariates import covariate_columns, read_covariates
+        from tissuq.experiments.reading.specimens_in_files import covariate_columns, read_covariates
 
         if self.covariates is not None and self.covariate:
             raise InputError("give --covariates TABLE, or --covariate for columns of the one FILE, not both.")
@@ -124,7 +124,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         return {name: of_one for name, of_one in readings.items() if name not in self.without}
 
     def _all_readings(self, folder: Path) -> dict[str, list[Reading]]:
-        from tissuq.experiments.reading.several_files import read_column
+        from tissuq.experiments.reading.specimens_in_files import read_column
         from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 
         sources = self.sources(folder)

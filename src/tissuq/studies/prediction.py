@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.drawing.panels import panels
+from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.pictures.curves import ways_of

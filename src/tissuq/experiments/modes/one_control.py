@@ -9,7 +9,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes.mode import SHEAR, ControlPath, LoadingMode
-from tissuq.experiments.modes.path import Deformation, Path
+from tissuq.experiments.modes.path import TINY, Deformation, Path
 
 __all__ = ["Equibiaxial", "Planar", "SimpleShear", "SimpleShearNormal", "Uniaxial"]
 
@@ -60,10 +60,6 @@ class Planar(LoadingMode):
 
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
         return point, 1.0, 1.0 / point
-
-
-TINY = 1e-300
-"""Gives a root a derivative at zero, where it is that of nothing."""
 
 
 def _sheared(shear: Any, height: Any, difference: Any) -> Deformation:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["STEP", "UNMEASURED", "Deformation", "Path", "States"]
+__all__ = ["STEP", "TINY", "UNMEASURED", "Deformation", "Path", "States"]
 
 FloatArray = NDArray[np.float64]
 
 STEP = 1e-30
 """Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
 TINY = 1e-300
-"""Keeps the rate of an angle a number where there is none."""
+"""Keeps the rate of an angle, or of a root at zero, a number where there is none."""
 UNMEASURED = -1
 """Number of the curve of states that belong to no measured one."""
 

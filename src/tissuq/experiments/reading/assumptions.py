@@ -10,6 +10,7 @@ from tissuq.experiments.reading.column_units import MPA_ASSUMED
 from tissuq.experiments.reading.headings import without_correction
 from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED, ZERO_ASSUMED
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stated_mode import is_torque
@@ -27,11 +28,8 @@ def is_doubtful(warning: str) -> bool:
     return DOUBTFUL_UNIT in warning or DOUBTFUL_COLUMN in warning
 
 
-def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_type: str | None) -> tuple[str, ...]:
-    """Return a sentence about everything that the steps of reading say was assumed, units first.
-
-    The type of stress is that which is asked for, if one is.
-    """
+def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions) -> tuple[str, ...]:
+    """Return a sentence about everything that the steps of reading say was assumed, units first."""
     source = "; ".join(measured.steps)
     sentences = []
     if MPA_ASSUMED in source:
@@ -57,10 +55,23 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
         names = (_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit)
         corrections = (_about_correction(measured.table, column, role) for column, role in roles.items())
         sentences += filter(None, (*names, *corrections))
-    if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
-        sentences += [_about_rim(name) for name in measured.table.names if is_torque(name)]
+    if choices[0].measure == "shear" and choices[0].load == "stress" and options.get("stress_type") is None:
+        sentences += [
+            f"column '{name}' stands beside the shear stress, which a rheometer states as if a twisted disc were of a "
+            "linear material. If a disc was twisted, give --stress-type torsion, which corrects it; if not, "
+            "--stress-type engineering."
+            for name in measured.table.names
+            if is_torque(name)
+        ]
     if ZERO_ASSUMED in source:
-        sentences += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
+        table, columns = measured.table, [choice.deformation for choice in choices]
+        about_zero = [
+            f"column {table.label(column)} does not begin at 0, and the load there is small: it was taken for "
+            "positions, and counted from its first row. To say so give --zero first; if it holds displacements, --zero "
+            f"'0 mm'; if it holds the length or height of the specimen, --column 'length={table.key(column)}'."
+            for column in columns
+        ]
+        sentences += labelled(measured.labels, about_zero)
     return tuple(sentences)
 
 
@@ -84,21 +95,4 @@ def _about_name(measured: MeasuredRows, column: int, role: str) -> str:
     return (
         f"{DOUBTFUL_COLUMN} {label} was taken for the {taken}. If it is, "
         f"say so: --column {role}={label}; if another column is, name that one there."
-    )
-
-
-def _about_zero(measured: MeasuredRows, choice: ColumnChoice) -> str:
-    column, table = choice.deformation, measured.table
-    return (
-        f"column {table.label(column)} does not begin at 0, and the load there is small: it was taken for positions, "
-        "and counted from its first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it "
-        f"holds the length or height of the specimen, --column 'length={table.key(column)}'."
-    )
-
-
-def _about_rim(torque: str) -> str:
-    return (
-        f"column '{torque}' stands beside the shear stress, which a rheometer states as if a twisted disc were of a "
-        "linear material. If a disc was twisted, give --stress-type torsion, which corrects it; if not, --stress-type "
-        "engineering."
     )

@@ -16,13 +16,13 @@ from tissuq.experiments.reading.recognition import (
     LENGTHENINGS,
     LOADS,
     OTHER_MEASURE,
+    PRESSURE,
     SHEARS,
     ColumnChoice,
     Contents,
     say_which,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.tube_columns import PRESSURE
 from tissuq.experiments.units import measured_in
 
 __all__ = [
@@ -74,7 +74,9 @@ def check_machine(table: Table, quantities: Sequence[str], column_read: int, mea
 
     By an extensometer or a camera, as names say; or, beside a displacement, in a column of strains or stretches.
     """
-    on_specimen = _columns_on_specimen(table, quantities)
+    on_specimen = [
+        column for column, name in enumerate(quantities) if ON_SPECIMEN.search(name) and not table.is_constant(column)
+    ]
     if column_read in on_specimen or measure not in ("displacement", "strain", "stretch"):
         return
     roles = {"length": "displacement", "strain": "strain", "pixels": "length"}
@@ -82,10 +84,9 @@ def check_machine(table: Table, quantities: Sequence[str], column_read: int, mea
         roles = {"": measure, "strain": measure}
     seen = {column: roles.get(measured_in(table.unit(column))) for column in on_specimen}
     if measure == "displacement":
-        unitless = {
-            column for column in on_specimen if not measured_in(table.unit(column)) and _is_ratio(table, column)
-        }
-        ratios = unitless.union(_ratios(table, quantities, column_read))
+        unitless = [column for column in on_specimen if not measured_in(table.unit(column))]
+        small = {column for column in unitless if np.abs(table.numbers([column])).max() < LARGEST_RATIO}
+        ratios = small.union(_ratios(table, quantities, column_read))
         seen |= {column: _ratio_role(table, column) for column in sorted(ratios)}
     seen = {column: role for column, role in seen.items() if role}
     if not seen or (measure != "displacement" and all(_is_same(table, column_read, column) for column in seen)):
@@ -113,12 +114,6 @@ def _ratios(table: Table, quantities: Sequence[str], displacement: int) -> list[
     ]
 
 
-def _is_ratio(table: Table, column: int) -> bool:
-    """Return whether numbers without a unit are so small that they can be strains or stretches."""
-    (values,) = table.numbers([column])
-    return bool(np.abs(values).max() < LARGEST_RATIO)
-
-
 def _ratio_role(table: Table, column: int) -> str:
     """Return whether numbers of a column are stretches, which begin at one, or strains."""
     (values,) = table.numbers([column])
@@ -129,14 +124,6 @@ def _is_same(table: Table, column: int, same_column: int) -> bool:
     """Return whether two columns say the same."""
     values, same_values = table.numbers([column, same_column])
     return bool(np.abs(same_values - values).max() <= MAX_DIFFERENCE * np.ptp(values))
-
-
-def _columns_on_specimen(table: Table, quantities: Sequence[str]) -> list[int]:
-    return [
-        column
-        for column, quantity in enumerate(quantities)
-        if ON_SPECIMEN.search(quantity) and not table.is_constant(column)
-    ]
 
 
 def check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:

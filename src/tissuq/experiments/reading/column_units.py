@@ -43,46 +43,37 @@ def factor_of(
     table: Table, column: int, quantity: Quantity, option: UnitOption, options: ReadingOptions
 ) -> tuple[float, str]:
     """Return the factor from a column's unit, which an option may state, and the words for where it comes from."""
-    unit = options.get(option)
-    declared = declared_unit(table, column)
-    proposed = f"{declared}f" if quantity is FORCE and declared in units.MASSES else quantity.unit
+    unit, declared = options.get(option), declared_unit(table, column)
+    if unit is not None:
+        factor, in_file = quantity.factor(unit), quantity.factor_or_none(declared)
+        if in_file is not None and in_file != factor:
+            raise _says_another(table, column, option, unit, declared)
+        return factor, f"{unit} (as given)"
+    proposed = units.MASSES.get(declared.lower(), quantity.unit) if quantity is FORCE else quantity.unit
     hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
-    if unit is None:
-        if not declared:
-            raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")
-        try:
-            return quantity.factor(declared), f"{declared} (from the file)"
-        except InputError as error:
-            raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
-    factor = quantity.factor(unit)
-    in_file = quantity.factor_or_none(declared)
-    if in_file is not None and in_file != factor:
-        raise InputError(
-            f"{table.place(column)}: {option}='{unit}' is given, but the file says '{declared}'. Leave {option} out, "
-            "or correct the file."
-        )
-    return factor, f"{unit} (as given)"
+    if not declared:
+        raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")
+    try:
+        return quantity.factor(declared), f"{declared} (from the file)"
+    except InputError as error:
+        raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
 
 
 def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, options: ReadingOptions) -> float:
     """Return what one unit of a column of strains is as a plain ratio."""
     strain_unit = options.get("strain_unit")
-    column = table.place(choice.deformation)
     try:
         in_file = units.strain_factor(declared)
     except InputError as error:
         if strain_unit is None:
             hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.measure == "strain" else ""
-            raise InputError(f"{column}: {error}{hint}") from error
+            raise InputError(f"{table.place(choice.deformation)}: {error}{hint}") from error
         declared, in_file = "", 1.0
     if strain_unit is None:
         return in_file
     factor = units.strain_factor(strain_unit)
     if declared and in_file != factor:
-        raise InputError(
-            f"{column}: strain_unit='{strain_unit}' is given, but the file says '{declared}'. Leave strain_unit "
-            "(--strain-unit) out, or correct the file."
-        )
+        raise _says_another(table, choice.deformation, "strain_unit", strain_unit, declared)
     return factor
 
 
@@ -91,25 +82,31 @@ def stress_unit_of(
 ) -> tuple[units.StressUnit, str]:
     """Return the unit of stresses, and the words for where it comes from."""
     declared, stress_unit = declared_unit(table, choice.stress), options.get("stress_unit")
-    if stress_unit is not None:
-        unit = units.stress_unit(stress_unit)
-        in_file = _unit_or_none(declared)
-        if in_file and not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
-            raise InputError(
-                f"{table.place(choice.stress)}: stress_unit='{stress_unit}' is given, but the file says "
-                f"'{declared}'. Leave stress_unit (--stress-unit) out, or correct the file."
-            )
-        return unit, f"{unit.name} (as given)"
-    if not declared:
+    if stress_unit is None and not declared:
         _check_assumed_mpa(table, choice, float(np.abs(values).max()))
         return units.StressUnit("MPa", 1.0), MPA_ASSUMED
     try:
-        unit = units.stress_unit(declared)
+        in_file = units.stress_unit(declared)
     except InputError as error:
-        raise InputError(
-            f"{table.place(choice.stress)}: {error} To say it yourself, give stress_unit (--stress-unit)."
-        ) from error
-    return unit, f"{unit.name} (from the file)"
+        if stress_unit is None:
+            hint = "To say it yourself, give stress_unit (--stress-unit)."
+            raise InputError(f"{table.place(choice.stress)}: {error} {hint}") from error
+        return (unit := units.stress_unit(stress_unit)), f"{unit.name} (as given)"
+    if stress_unit is None:
+        return in_file, f"{in_file.name} (from the file)"
+    unit = units.stress_unit(stress_unit)
+    if not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
+        raise _says_another(table, choice.stress, "stress_unit", stress_unit, declared)
+    return unit, f"{unit.name} (as given)"
+
+
+def _says_another(table: Table, column: int, option: str, unit: str, declared: str) -> InputError:
+    """Return that an option states another unit of a column than the file."""
+    flag = f"--{option.replace('_', '-')}"
+    return InputError(
+        f"{table.place(column)}: {option}='{unit}' is given, but the file says '{declared}'. Leave {option} ({flag}) "
+        "out, or correct the file."
+    )
 
 
 def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> None:
@@ -128,10 +125,3 @@ def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> No
         f"{table.place(choice.stress)}: no unit of stress is stated for it, {reason}. Give stress_unit={likely!r} "
         f"(--stress-unit {likely}), or whichever it is."
     )
-
-
-def _unit_or_none(text: str) -> units.StressUnit | None:
-    try:
-        return units.stress_unit(text) if text else None
-    except InputError:
-        return None

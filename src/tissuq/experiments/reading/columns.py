@@ -18,19 +18,8 @@ from tissuq.experiments.reading.column_checks import (
     check_together,
     with_types,
 )
-from tissuq.experiments.reading.headings import (
-    AXES,
-    COMPONENTS,
-    measure_in,
-    of_spread,
-    on_axis,
-    plain,
-    role_names,
-    stretches_less_one,
-    without_correction,
-    without_gradient,
-    without_mean,
-)
+from tissuq.experiments.reading.headings import AXES, COMPONENTS, contents_of, on_axis, plain
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
     DEFORMATIONS_OF_UNITS,
@@ -42,54 +31,29 @@ from tissuq.experiments.reading.recognition import (
     columns_there_are,
     recognise,
     told_by_unit,
+    with_columns_of_tube,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.tube_columns import with_columns_of_tube
-from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT
+from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
-__all__ = [
-    "about_stress",
-    "choose_columns",
-    "find_column",
-    "mapping_of_each_stress",
-]
+__all__ = ["about_stress", "choose_columns", "find_column", "mapping_of_each_stress"]
 
 
-def choose_columns(
-    table: Table,
-    mode: LoadingMode,
-    mapping: Mapping[str, str | int] | None,
-    strain_type: str | None,
-    stress_type: str | None,
-    axis: str | None,
-) -> dict[str, ColumnChoice]:
+def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:
     """Return the columns of every stress of a mode, by what it is called; of a mode with one by an empty text.
 
-    They are those of the mapping, the others are known by their names: a stress goes before a force, a stretch or
+    They are those of the options, the others are known by their names: a stress goes before a force, a stretch or
     strain before a displacement. Those of a second stress are known by the axis in their names, or given in roles that
-    end in 2.
-
-    Parameters
-    ----------
-    table : Table
-        The table to choose from.
-    mode : LoadingMode
-    mapping : mapping or None
-        From a role (stretch, strain, displacement, length, shear, twist or a diameter; stress, torque, force or
-        pressure) to the name of a column, or its number from 1.
-    strain_type, stress_type : str or None
-        Which measures they are, by the names in `STRAIN_MEASURES` and `STRESS_MEASURES`; what the columns' names say
-        where none is given, and engineering where these say nothing.
-    axis : str or None
-        ``x`` or ``y``: whose columns are read from the file of a biaxial machine in a mode with one stress.
+    end in 2. Which measures of strain and stress they are, names say where no option does; engineering ones where these
+    say nothing.
 
     Raises
     ------
     InputError
         When a role or column does not exist, several columns fit, or none does.
     """
-    count = len(mode.stresses)
+    count, mapping, axis = len(mode.stresses), options.get("columns"), options.get("axis")
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
@@ -106,7 +70,7 @@ def choose_columns(
         if number and len(mode.controls) == 1:
             roles = roles | {choices[0].measure: choices[0].deformation + 1}
         with about_stress(number, labels, mode):
-            choices.append(_choice(table, mode, roles, (strain_type, stress_type), axis_of_stress))
+            choices.append(_choice(table, mode, roles, options, axis_of_stress))
     if count > 1:
         check_together(table, mode, choices)
     return dict(zip(labels, choices, strict=True))
@@ -155,7 +119,7 @@ def _with_numbered_second(table: Table) -> dict[str, str | int]:
     columns: dict[str, str | int] = {}
     names = [on_axis(name) for name, _ in _names(table)]
     for column, (axis, name) in enumerate(names, start=1):
-        role = next((role for role in (*DEFORMATIONS, *LOADS) if name in role_names(role)), "")
+        role = next((role for role in (*DEFORMATIONS, *LOADS) if name in ROLES[role]), "")
         numbered = role + "2" * (axis == "y")
         if role and (axis == "x" or numbered in columns):
             return {}
@@ -173,30 +137,8 @@ def _axes_of(table: Table) -> list[str]:
 
 
 def _names(table: Table) -> list[tuple[str, str]]:
-    """Return what the columns' names say they hold, and the measure of strain or stress; empty texts of spreads.
-
-    Beside columns of a spread without words for a mean.
-    """
-    quantities = table.quantities
-    is_less_one = stretches_less_one(table.names)
-    quantities = ["strain" if less_one else name for name, less_one in zip(quantities, is_less_one, strict=True)]
-    quantities = _corrected_alone(quantities)
-    is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]
-    quantities = [without_gradient(name) if ratio else name for name, ratio in zip(quantities, is_ratio, strict=True)]
-    is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]
-    if any(is_spread):
-        quantities = [without_mean(quantity) or quantity for quantity in quantities]
-    return [("", "") if of_spread else measure_in(name) for name, of_spread in zip(quantities, is_spread, strict=True)]
-
-
-def _corrected_alone(quantities: Sequence[str]) -> list[str]:
-    """Return what columns hold, of those that stand there with and without a correction only the corrected ones."""
-    plain_names = [without_correction(quantity) for quantity in quantities]
-    corrected = {name for name, quantity in zip(plain_names, quantities, strict=True) if name != quantity}
-    return [
-        "" if name == quantity and quantity in corrected else name
-        for name, quantity in zip(plain_names, quantities, strict=True)
-    ]
+    """Return what the columns' names say they hold, and the measure of strain or stress."""
+    return contents_of(table.names, [table.unit(column) for column in range(len(table.names))])
 
 
 def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
@@ -210,16 +152,13 @@ def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] |
 
 
 def _choice(
-    table: Table,
-    mode: LoadingMode,
-    mapping: Mapping[str, str | int],
-    types: tuple[str | None, str | None],
-    axis: str | None,
+    table: Table, mode: LoadingMode, mapping: Mapping[str, str | int], options: ReadingOptions, axis: str | None
 ) -> ColumnChoice:
-    """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
+    """Return the columns of one stress, in roles that are given or by their names."""
     is_shear, unnamed = mode.controls == (SHEAR,), set[int]()
     check_roles(table, mapping, is_shear)
-    contents = Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
+    quantities, measures = _quantities(table, axis, mapping), [measure for _, measure in _names(table)]
+    contents = Contents(quantities, measures, options.get("strain_type"), options.get("stress_type"))
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
@@ -255,7 +194,7 @@ def _choice(
         else:
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
-            measure = next((measure for measure in measures if name in role_names(measure)), "strain")
+            measure = next((measure for measure in measures if name in ROLES[measure]), "strain")
             if is_shear and measure == "stretch":
                 check_is_shear(table, deformation)
                 unnamed |= {deformation}
@@ -290,7 +229,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
             f"{table.file} has no columns of an axis '{axis}'. {columns_there_are(table)} Leave axis (--axis) out."
         )
     if axis is None and len(axes) == 2 and not mapping:
-        loaded = {axis_of_load for axis_of_load, name in names if any(name in role_names(role) for role in LOADS)}
+        loaded = {axis_of_load for axis_of_load, name in names if any(name in ROLES[role] for role in LOADS)}
         if len(loaded & {*axes}) == 1:
             (only,) = loaded & {*axes}
             raise InputError(
@@ -319,7 +258,7 @@ def _without_empty(table: Table, names: Sequence[tuple[str, str]]) -> list[tuple
 
     An axis that is held at its length while the load along it changes (a strip test) keeps its deformation.
     """
-    deformations, loads = (frozenset().union(*map(role_names, roles)) for roles in (DEFORMATIONS, LOADS))
+    deformations, loads = (frozenset().union(*(ROLES[role] for role in roles)) for roles in (DEFORMATIONS, LOADS))
     filled = list(names)
     is_loaded = {axis for column, (axis, name) in enumerate(names) if name in loads and not table.is_constant(column)}
     for kind in (deformations, loads):

@@ -10,31 +10,23 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import about_stress, mapping_of_each_stress
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions
-from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimensions_of_stresses
-from tissuq.experiments.reading.height_of_block import of_block
-from tissuq.experiments.reading.labels import columns_only
+from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimensions_of_stresses, of_block
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.repeated_sizes import test_beside
-from tissuq.experiments.reading.several_specimens import check_one_specimen
+from tissuq.experiments.reading.rows_of_tests import check_one_specimen, columns_only
+from tissuq.experiments.reading.side_by_side import test_beside
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE
 
-__all__ = [
-    "as_columns",
-    "measured_rows",
-    "stress_measure_of",
-    "with_engineering_stress",
-]
+__all__ = ["as_columns", "measured_rows", "stress_measure_of", "with_engineering_stress"]
 
 LONG = "engineering stress of "
 """How names of several stresses begin; what is said of each of them begins with the axis alone."""
@@ -54,10 +46,7 @@ def measured_rows(
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     check_one_specimen(table, columns, np.mean([deformation for deformation, _ in numbers], axis=0))
     specimens = names_of_specimen(table, columns, options.get("only"))
-    test = None
-    if len(columns) == 1:
-        is_shear = mode.controls == (SHEAR,)
-        test = test_beside(table, columns[0].stress, options.get("stress_type"), is_shear=is_shear)
+    test = test_beside(table, columns[0].stress, mode, options) if len(columns) == 1 else None
     dimensions = dimensions_of(table, options.get("dimensions"), specimens, test)
     if len(columns) == 1:
         words = [Path(table.file).name, table.sheet, table.title, options.get("name") or ""]

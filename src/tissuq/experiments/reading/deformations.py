@@ -8,7 +8,7 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import UnitOption, declared_unit, factor_of, strain_factor_of
-from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words, tube_of
+from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words
 from tissuq.experiments.reading.dimensions_of_table import initial_size
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.options import ReadingOptions
@@ -22,9 +22,8 @@ from tissuq.experiments.reading.plausibility import (
     check_positions,
     check_strain,
 )
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import DIAMETERS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.tube_columns import DIAMETERS
 from tissuq.experiments.units import ANGLE, FORCE, LENGTH, PIXELS, RATE, TIME, Quantity, measured_in
 
 __all__ = ["stretch_of", "without_machine"]
@@ -235,7 +234,7 @@ def _from_diameter(
 ) -> tuple[Column, str]:
     """Return the hoop stretches in the middle of the wall of a tube, and how they were obtained."""
     factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", options)
-    tube, words = tube_of(dimensions)
+    tube, words = dimensions.tube
     is_outer = choice.measure == DIAMETERS[0]
     face, letter = (tube.outer, "B") if is_outer else (tube.inner, "A")
     try:

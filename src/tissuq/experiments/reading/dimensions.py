@@ -11,16 +11,7 @@ from tissuq.experiments.reading.stated_sizes import StatedSize
 from tissuq.experiments.reading.uneven_stress import Tube
 from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
-__all__ = [
-    "SECTIONS",
-    "Dimension",
-    "Dimensions",
-    "agree",
-    "in_words",
-    "quantity_of",
-    "sections_of",
-    "tube_of",
-]
+__all__ = ["SECTIONS", "Dimension", "Dimensions", "agree", "in_words", "quantity_of", "sections_of"]
 
 SHOWN = 3
 """Number of other sizes that a message shows."""
@@ -119,13 +110,14 @@ class Dimensions:
         return Dimension(diameter.value / 2, f"half the diameter {diameter.source}")
 
     @property
-    def wall_of_tube(self) -> tuple[Dimension, Dimension]:
-        """The undeformed outer diameter of a tube, and the thickness of its wall.
+    def tube(self) -> tuple[Tube, str]:
+        """The undeformed tube, and its radii in words.
 
         Raises
         ------
         InputError
-            When one of them is not known, or the wall is thicker than half the diameter, or other sizes are given.
+            When its outer diameter or the thickness of its wall is not known, or the wall is thicker than half the
+            diameter, or other sizes are given.
         """
         advice = (
             "to turn pressure and diameter of a tube into stress and stretch give its undeformed outer diameter and "
@@ -140,7 +132,9 @@ class Dimensions:
                 f"{self.file}: a wall of {thickness.value:g} mm (thickness {thickness.source}) does not fit into an "
                 f"outer diameter of {diameter.value:g} mm ({diameter.source})."
             )
-        return diameter, thickness
+        tube = Tube(diameter.value / 2 - thickness.value, diameter.value / 2)
+        words = f"A = {tube.inner:g} mm and B = {tube.outer:g} mm (undeformed radii; diameter {diameter.source}, "
+        return tube, f"{words}thickness {thickness.source})"
 
     @property
     def area(self) -> Dimension:
@@ -257,11 +251,3 @@ def quantity_of(name: str) -> Quantity:
 def in_words(dimension: Dimension) -> str:
     """Return a length and where it comes from."""
     return f"{dimension.value:g} mm ({dimension.source})"
-
-
-def tube_of(dimensions: Dimensions) -> tuple[Tube, str]:
-    """Return the undeformed tube, and its radii in words."""
-    diameter, thickness = dimensions.wall_of_tube
-    tube = Tube(diameter.value / 2 - thickness.value, diameter.value / 2)
-    words = f"A = {tube.inner:g} mm and B = {tube.outer:g} mm (undeformed radii; diameter {diameter.source}, "
-    return tube, f"{words}thickness {thickness.source})"

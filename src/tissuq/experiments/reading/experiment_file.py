@@ -18,18 +18,11 @@ from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
-from tissuq.experiments.reading.conversion import (
-    as_columns,
-    measured_rows,
-    stress_measure_of,
-    with_engineering_stress,
-)
-from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
+from tissuq.experiments.reading.conversion import as_columns, measured_rows, stress_measure_of, with_engineering_stress
 from tissuq.experiments.reading.data_frame import is_data_frame
-from tissuq.experiments.reading.labels import check_labels, columns_only, labels_of
-from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.plausibility import check_stretches
+from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.regions import (
     AUTO,
@@ -40,9 +33,12 @@ from tissuq.experiments.reading.regions import (
     slack_error,
     tested_stresses,
 )
-from tissuq.experiments.reading.several_specimens import (
+from tissuq.experiments.reading.rows_of_tests import (
     SeveralSpecimens,
+    columns_only,
+    labels_of,
     only_rows,
+    other_label,
     specimen_of,
 )
 from tissuq.experiments.reading.signs import check_signs, with_signs
@@ -57,16 +53,8 @@ from tissuq.experiments.reading.stated_mode import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
-from tissuq.experiments.reading.volume import volume_step
 
-__all__ = [
-    "Reading",
-    "read",
-    "read_experiment",
-    "read_file",
-    "read_rows",
-    "table_of",
-]
+__all__ = ["Reading", "read", "read_experiment", "read_file", "read_rows", "table_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +268,8 @@ def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     table = table_of(path, plain)
     rows = only_rows(table, columns_only(table, plain.get("only")))
     reading = read_rows(rows, table.file if is_data_frame(path) else path, **plain)
-    check_labels(table, reading.experiment, plain.get("only"))
+    if refusal := other_label(table, reading.experiment, plain.get("only")):
+        raise InputError(refusal)
     return reading
 
 
@@ -298,10 +287,9 @@ def read_rows(
     """
     stated, mode_source = mode_of(path, table, options, words)
     mode = checked_mode(stated, options)
-    name, is_positive = options.get("name"), options.get("compression_positive")
-    types = options.get("strain_type"), options.get("stress_type")
+    name = options.get("name")
     with about_mode(mode.name, mode_source):
-        labelled_choices = choose_columns(table, mode, options.get("columns"), *types, options.get("axis"))
+        labelled_choices = choose_columns(table, mode, options)
     choices = tuple(labelled_choices.values())
     if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
         check_not_sheared(table)
@@ -318,11 +306,10 @@ def read_rows(
         absent, table = set(table.lines) - set(readable.lines), readable
         measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
-    recorded = with_signs(
-        measured, choices, is_positive, options.get("turn"), direction_of(*(text for _, text in table.head), *names)
-    )
+    direction = direction_of(*(text for _, text in table.head), *names)
+    recorded = with_signs(measured, choices, options, direction)
     cycles = find_cycles(table, recorded.course)
-    used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
+    used = recorded.of_cycle(cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
         used = used.without_lines(lines, absent)
     reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
@@ -352,7 +339,7 @@ def read_rows(
     if (step := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
-    check_signs(used, choices, bool(is_positive), options.get("turn"), shown)
+    check_signs(used, choices, options, shown)
     if mode.name == Uniaxial.name and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
         used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
@@ -367,7 +354,7 @@ def read_rows(
         least_errors=errors | least_errors(tested),
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
     problems = (spread.problem for spread in spreads if spread.problem)
-    doubts = *assumptions(used, choices, types[1]), *dimensions.averages, *dimensions.contradictions
+    doubts = *assumptions(used, choices, options), *dimensions.averages, *dimensions.contradictions
     about_loads = filter(None, (load.note for load in loads))
     notes = *table.notes, *problems, *about_loads
     return Reading(

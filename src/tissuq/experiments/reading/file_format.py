@@ -70,8 +70,12 @@ def sheets_with_tables(
         When there is no such sheet, or none with a table.
     """
     if sheet is not None:
-        name = _sheet_named(path, list(sheets), sheet)
-        return {name: sheets[name]}
+        names, text = list(sheets), str(sheet)
+        if text not in names and text.isdecimal() and 1 <= int(text) <= len(names):
+            text = names[int(text) - 1]
+        if text not in names:
+            raise InputError(f"{path} has no sheet '{sheet}'. The sheets are: {', '.join(map(repr, names))}.")
+        return {text: sheets[text]}
     tables = {
         name: lines
         for name, lines in sheets.items()
@@ -82,15 +86,6 @@ def sheets_with_tables(
             f"{path} holds no sheet with a table of numbers. The sheets are: {', '.join(map(repr, sheets)) or 'none'}."
         )
     return tables
-
-
-def _sheet_named(path: str | os.PathLike[str], names: list[str], sheet: str | int) -> str:
-    text = str(sheet)
-    if text in names:
-        return text
-    if text.isdecimal() and 1 <= int(text) <= len(names):
-        return names[int(text) - 1]
-    raise InputError(f"{path} has no sheet '{sheet}'. The sheets are: {', '.join(map(repr, names))}.")
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 from tissuq.experiments.checked_arrays import LARGE_STRETCH
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
-from tissuq.experiments.reading.cycles import Cycle
+from tissuq.experiments.reading.disturbances import scatter_of_neighbours
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
-from tissuq.experiments.reading.load_cell import scatter_of_neighbours
-from tissuq.experiments.reading.measured_rows import labelled
-from tissuq.experiments.reading.regions import Region
-from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests, jump
+from tissuq.experiments.reading.measured_rows import Cycle, labelled
+from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
+from tissuq.experiments.reading.rows_of_tests import advice_on_numbered_tests, jump
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
-from tissuq.experiments.reading.volume import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -70,16 +68,13 @@ def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
     doubtful = "doubtful-reading", Severity.PROBLEM
     warnings = [ResultWarning(text, *doubtful if is_doubtful(text) else CAUTION) for text in reading.notes]
     for kind in dict.fromkeys(region.kind for regions in reading.regions for region in regions):
-        texts = labelled(labels, [_of_kind(regions, kind) for regions in reading.regions])
+        of_kind = ([region.text for region in regions if region.kind == kind] for regions in reading.regions)
+        texts = labelled(labels, [" ".join(sentences) for sentences in of_kind])
         warnings += [ResultWarning(text, *REGION_CODES.get(kind, CAUTION)) for text in texts if text]
     for check, code_and_severity in CHECKS.items():
         texts = labelled(labels, [check(reading, number) for number in range(len(labels))])
         warnings += [ResultWarning(text, *code_and_severity) for text in texts if text]
     return tuple(warnings)
-
-
-def _of_kind(regions: Sequence[Region], kind: str) -> str:
-    return " ".join(region.text for region in regions if region.kind == kind)
 
 
 def _size(reading: Reading, number: int) -> str:

@@ -9,7 +9,6 @@ from functools import cache, lru_cache
 
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES, StrainMeasure, StressMeasure
 from tissuq.experiments.reading.vocabulary import (
-    COUNT_NAMES,
     DIMENSION_NAMES,
     HEIGHT_NAMES,
     MEAN_WORDS,
@@ -22,16 +21,16 @@ from tissuq.experiments.reading.vocabulary import (
     names_of,
     without_accents,
 )
-from tissuq.experiments.units import BRACKETS, looks_like_unit
+from tissuq.experiments.units import BRACKETS, looks_like_unit, measured_in
 
 __all__ = [
     "AXES",
     "COMPONENTS",
     "STRESS_NOUNS",
     "Heading",
+    "contents_of",
     "dimensions_named",
     "heading",
-    "is_of_count",
     "is_of_mean",
     "is_of_role",
     "is_of_specimens",
@@ -40,10 +39,7 @@ __all__ = [
     "on_axis",
     "on_lettered_axis",
     "plain",
-    "role_names",
-    "stretches_less_one",
     "without_correction",
-    "without_gradient",
     "without_mean",
 ]
 
@@ -178,17 +174,6 @@ def dimensions_named(quantity: str, *, is_cylinder: bool = False) -> frozenset[s
     return dimensions | {"length"} if is_cylinder and name in HEIGHT_NAMES else dimensions
 
 
-def without_gradient(quantity: str) -> str:
-    """Return the name of a column without a unit, a component of the deformation gradient as a stretch along its axis.
-
-    Examples
-    --------
-    >>> without_gradient("f11"), without_gradient("f yy"), without_gradient("f1")
-    ('stretch 11', 'stretch yy', 'f1')
-    """
-    return DEFORMATION_GRADIENT.sub(r"stretch \1", quantity) if DEFORMATION_GRADIENT.fullmatch(quantity) else quantity
-
-
 def without_correction(quantity: str) -> str:
     """Return what a column holds without words that it was corrected, as for the machine's compliance.
 
@@ -200,21 +185,34 @@ def without_correction(quantity: str) -> str:
     return plain(CORRECTED.sub(" ", quantity))
 
 
-def stretches_less_one(names: Sequence[str]) -> list[bool]:
-    """Tell which columns are strains by names that take one off a stretch; none where names number two stretches.
+def contents_of(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str]]:
+    """Return what columns hold by their names, and the measure of strain or stress; empty texts of spreads.
+
+    A stretch less one is a strain, unless the names number stretches; a component of the deformation gradient, which
+    has no unit as forces do, is a stretch along its axis. Of columns with and without a correction only the corrected
+    ones are named, and beside columns of a spread words for a mean are left out.
 
     Examples
     --------
-    >>> stretches_less_one(["lambda - 1", "stress"]), stretches_less_one(["lambda-1", "lambda-2"])
-    ([True, False], [False, False])
+    >>> contents_of(["lambda - 1", "True stress (kPa)"], ["", "kPa"]), contents_of(["lambda-1", "lambda-2"], ["", ""])
+    ([('strain', ''), ('stress', 'cauchy')], [('lambda 1', ''), ('lambda 2', '')])
+    >>> contents_of(["F11", "f1", "corrected load", "load"], ["", "", "N", "N"])
+    [('stretch 11', ''), ('f1', ''), ('load', ''), ('', '')]
     """
     are_numbered = any(LESS_TWO.fullmatch(name.strip()) for name in names)
-    return [LESS_ONE.fullmatch(name.strip()) is not None and not are_numbered for name in names]
-
-
-def role_names(role: str) -> frozenset[str]:
-    """Return the names that columns of a role may have."""
-    return ROLES[role]
+    less_one = [LESS_ONE.fullmatch(name.strip()) and not are_numbered for name in names]
+    stated = ["strain" if is_one else heading(name).quantity for name, is_one in zip(names, less_one, strict=True)]
+    quantities = [without_correction(quantity) for quantity in stated]
+    corrected = {name for name, quantity in zip(quantities, stated, strict=True) if name != quantity}
+    for column, (name, unit) in enumerate(zip(quantities, units, strict=True)):
+        if stated[column] in corrected:
+            quantities[column] = ""
+        elif DEFORMATION_GRADIENT.fullmatch(name) and (not unit or measured_in(unit) == "strain"):
+            quantities[column] = DEFORMATION_GRADIENT.sub(r"stretch \1", name)
+    is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]
+    if any(is_spread):
+        quantities = [without_mean(quantity) or quantity for quantity in quantities]
+    return [("", "") if spread else measure_in(name) for name, spread in zip(quantities, is_spread, strict=True)]
 
 
 def measure_in(quantity: str) -> tuple[str, str]:
@@ -273,11 +271,6 @@ def without_mean(quantity: str) -> str:
 def is_of_mean(quantity: str) -> bool:
     """Tell whether a column of that name is of a mean of specimens."""
     return _words(MEAN_WORDS).search(quantity) is not None
-
-
-def is_of_count(quantity: str) -> bool:
-    """Tell whether a column of that name tells of how many specimens a mean is."""
-    return COUNT_NAMES.fullmatch(quantity) is not None
 
 
 @cache

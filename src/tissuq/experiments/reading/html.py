@@ -58,8 +58,7 @@ class _Page(HTMLParser):
             self.rows[-1].append("")
             span = dict(attrs).get("colspan") or ""
             self._empty_after = min(int(span), MOST_SPANNED) - 1 if span.isdecimal() and int(span) else 0
-        elif tag in ("tr", "table") or (tag in LINES and not self._is_in_cell):
-            self._end_cell()
+        else:
             self._begin_line(tag)
 
     def handle_endtag(self, tag: str) -> None:
@@ -67,8 +66,7 @@ class _Page(HTMLParser):
             self._unseen = max(0, self._unseen - 1)
         elif tag in CELLS:
             self._end_cell()
-        elif tag in ("tr", "table") or (tag in LINES and not self._is_in_cell):
-            self._end_cell()
+        else:
             self._begin_line(tag)
 
     def handle_data(self, data: str) -> None:
@@ -82,8 +80,10 @@ class _Page(HTMLParser):
             row.append(text)
 
     def _begin_line(self, tag: str) -> None:
-        """Begin a line, after a blank one where a table begins or ends."""
-        self.rows += [[""], []] if tag == "table" else [[]]
+        """Begin a line where a tag does, after a blank one where a table begins or ends."""
+        if tag in ("tr", "table") or (tag in LINES and not self._is_in_cell):
+            self._end_cell()
+            self.rows += [[""], []] if tag == "table" else [[]]
 
     def _end_cell(self) -> None:
         """Add the empty cells that the last one spans."""

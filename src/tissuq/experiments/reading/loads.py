@@ -10,7 +10,7 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
-from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
+from tissuq.experiments.reading.dimensions import Dimensions, in_words
 from tissuq.experiments.reading.measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import FIRST_ROW
@@ -68,7 +68,7 @@ class Load:
                 f"preload must be a positive force or stress with its unit, such as '0.05 N', not '{preload}'."
             )
         quantities = [self.divided] if self.divided else [FORCE, FORCE_PER_WIDTH]
-        if unit not in units.MASSES and all(quantity.factor_or_none(unit) is None for quantity in quantities):
+        if unit.lower() not in units.MASSES and all(quantity.factor_or_none(unit) is None for quantity in quantities):
             return number * units.stress_unit(unit).to_mpa
         if self.divided is None:
             raise InputError(f"preload '{preload}' is a force, but the file gives stresses; give it as a stress.")
@@ -94,7 +94,7 @@ def stress_of(
         return Load(values * scale, _unit_shown(options), source, scale=scale)
     if choice.load == "pressure":
         factor, unit_source = factor_of(table, choice.stress, PRESSURE, "force_unit", options)
-        tube, _ = tube_of(dimensions)
+        tube, _ = dimensions.tube
         source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
         scale = factor / tube.log_ratio
         return Load(

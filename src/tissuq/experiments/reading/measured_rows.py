@@ -1,25 +1,49 @@
-"""The rows of one test on their way to an experiment, with a sentence for every step, and from where they are taut."""
+"""The rows of one test on their way to an experiment, a sentence for every step: its cycles, and where it is taut."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.events import ends_of_rests
+from tissuq.experiments.branches import turning_points
+from tissuq.experiments.reading.disturbances import ends_of_rests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
-__all__ = ["COUNTED_FROM", "Dropped", "MeasuredRows", "labelled"]
+__all__ = ["COUNTED_FROM", "Cycle", "Dropped", "MeasuredRows", "find_cycles", "labelled"]
 
 COUNTED_FROM = "stretch counted from"
 """How the step begins that says where the specimen is undeformed."""
 STRETCH_MARGIN = 1e-5
 """Share by which a stretch may lie beyond those that are asked for: they are printed with six digits."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Rows of one cycle, counted from 0: from ``start`` up to ``stop``, turning at ``peak``.
+
+    Loading is the direction in which the cycle first goes, tension or compression.
+    """
+
+    label: str
+    start: int
+    peak: int
+    stop: int
+
+    def rows(self, branch: str | None = None) -> NDArray[np.intp]:
+        """Return its rows, or those of one branch; both branches have the turning point."""
+        start = self.peak if branch == "unloading" else self.start
+        stop = self.peak + 1 if branch == "loading" else self.stop
+        return np.arange(start, stop)
 
 
 @dataclass(frozen=True)
@@ -95,6 +119,23 @@ class MeasuredRows:
             return self
         counts = (count,) * len(self.labels)
         return replace(self.taken(rows), dropped=(*self.dropped, Dropped(counts, reason)))
+
+    def of_cycle(self, cycles: Sequence[Cycle], cycle: str | int | None, branch: str | None) -> MeasuredRows:
+        """Return the rows of one cycle (``first``, ``last`` or its number from 1), one branch, or both.
+
+        Raises
+        ------
+        InputError
+            When there is no such cycle or branch.
+        """
+        if cycle is None and branch is None:
+            return self
+        wanted = list(cycles) if cycle is None else [cycles[_position(self.table.file, len(cycles), cycle)]]
+        rows = np.unique(np.concatenate([wanted_cycle.rows(branch) for wanted_cycle in wanted]))
+        if branch == "unloading" and len(rows) <= len(wanted):
+            raise InputError(f"{self.table.file}: there is no unloading in {_words(wanted, cycles)}.")
+        what = f"{branch} of {_words(wanted, cycles)}" if branch else _words(wanted, cycles)
+        return self.kept(rows, f"not {what}").with_step(f"only {what}")
 
     def until_peak(self) -> MeasuredRows:
         """Return the rows up to the largest stress; of several, to where they are largest together."""
@@ -197,10 +238,10 @@ class MeasuredRows:
             When no row carries the preload.
         """
         pairs = enumerate(thresholds)
-        starts = [_TautStart.of(self, number, preload, threshold, peak, unit) for number, threshold in pairs]
+        starts = [_taut_start(self, number, preload, threshold, peak, unit) for number, threshold in pairs]
         if reference and (not_positive := next((start for start in starts if start.stretch <= 0), None)):
             raise InputError(
-                f"{self.table.file}: where the preload {preload} is reached ({not_positive.place_in_words}), the "
+                f"{self.table.file}: where the preload {preload} is reached ({not_positive.lines}), the "
                 f"stretch is {not_positive.stretch:g}, not positive. Check the length of the specimen and the column "
                 "of displacements."
             )
@@ -222,7 +263,8 @@ class MeasuredRows:
         used = self.taken(np.flatnonzero(is_taut))
         references = np.array([[start.stretch] for start in starts])
         used = replace(used._counted_from(references, reference), dropped=(*self.dropped, *dropped))
-        return used.with_step(*(start.sentence(preload) for start in starts))
+        reached = f"where the preload {preload} is reached"
+        return used.with_step(*(f"{COUNTED_FROM} {start.stretch:.6g}, {reached} {start.lines}" for start in starts))
 
 
 def labelled(labels: Sequence[str], texts: Sequence[str]) -> list[str]:
@@ -232,42 +274,85 @@ def labelled(labels: Sequence[str], texts: Sequence[str]) -> list[str]:
     return [f"{label}: {text}" for label, text in zip(labels, texts, strict=True) if text]
 
 
-@dataclass(frozen=True)
-class _TautStart:
+class _TautStart(NamedTuple):
     """From which row on an axis is taut, the stretch there, and where that is in words."""
 
     row: int
     stretch: float
-    place_in_words: str
+    lines: str
 
-    @classmethod
-    def of(
-        cls, measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int, unit: StressUnit
-    ) -> _TautStart:
-        """Return where the stress of that number reaches a threshold on the way to a row."""
-        table, stretch, size = measured.table, measured.stretch[number], np.abs(measured.stress[number])
-        is_loaded = size[: peak + 1] >= threshold
-        if not is_loaded.any():
-            raise InputError(
-                f"{table.file}: the preload {preload} is not reached: the largest stress is "
-                f"{unit.written(size[: peak + 1].max())}, and the preload is {unit.written(threshold)}. Give a lower "
-                "one, and check the units of force and area."
-            )
-        slack = np.flatnonzero(~is_loaded)
-        slack = slack[slack < np.flatnonzero(is_loaded)[-1]]
-        if len(slack):
-            row = int(slack[-1]) + 1
-            share = (threshold - size[row - 1]) / (size[row] - size[row - 1])
-            reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
-            words = f"between {table.counted}s {table.lines[row - 1]} and {table.lines[row]}"
-            start = cls(row, float(reference), words)
-        else:
-            words = (
-                f"in {table.counted} {table.lines[0]}, the first, where the stress is already {unit.written(size[0])}"
-            )
-            start = cls(0, float(stretch[0]), words)
-        return start
 
-    def sentence(self, preload: str) -> str:
-        """Return the sentence about this step."""
-        return f"{COUNTED_FROM} {self.stretch:.6g}, where the preload {preload} is reached {self.place_in_words}"
+def _taut_start(
+    measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int, unit: StressUnit
+) -> _TautStart:
+    """Return where the stress of that number reaches a threshold on the way to a row."""
+    table, stretch, size = measured.table, measured.stretch[number], np.abs(measured.stress[number])
+    is_loaded = size[: peak + 1] >= threshold
+    if not is_loaded.any():
+        raise InputError(
+            f"{table.file}: the preload {preload} is not reached: the largest stress is "
+            f"{unit.written(size[: peak + 1].max())}, and the preload is {unit.written(threshold)}. Give a lower one, "
+            "and check the units of force and area."
+        )
+    slack = np.flatnonzero(~is_loaded)
+    slack = slack[slack < np.flatnonzero(is_loaded)[-1]]
+    if not len(slack):
+        words = f"in {table.counted} {table.lines[0]}, the first, where the stress is already {unit.written(size[0])}"
+        return _TautStart(0, float(stretch[0]), words)
+    row = int(slack[-1]) + 1
+    share = (threshold - size[row - 1]) / (size[row] - size[row - 1])
+    reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
+    words = f"between {table.counted}s {table.lines[row - 1]} and {table.lines[row]}"
+    return _TautStart(row, float(reference), words)
+
+
+def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
+    """Return the cycles of a test, by the file's column of cycles where it has several, else by turning points."""
+    labels = _cycle_labels(table)
+    starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1]), len(labels)]
+    if len(starts) > 2:
+        peaks = (
+            start + int(np.argmax(np.abs(stretch[start:stop] - stretch[start]))) for start, stop in pairwise(starts)
+        )
+        return [Cycle(labels[s], s, p, t) for (s, t), p in zip(pairwise(starts), peaks, strict=True)]
+    ends = [0, *turning_points(stretch), len(stretch) - 1]
+    bounds = [*ends[0:-1:2], ends[-1]]
+    return [
+        Cycle(str(number), start, ends[2 * number - 1], stop + (stop == len(stretch) - 1))
+        for number, (start, stop) in enumerate(pairwise(bounds), start=1)
+    ]
+
+
+def _words(wanted: Sequence[Cycle], cycles: Sequence[Cycle]) -> str:
+    count = f"{len(cycles)} cycle{'s' * (len(cycles) != 1)}"
+    if len(wanted) > 1:
+        return f"all {count}"
+    number = list(cycles).index(wanted[0]) + 1
+    label = "" if wanted[0].label == str(number) else f" ('{wanted[0].label}')"
+    return f"cycle {number}{label} of {len(cycles)}"
+
+
+def _position(file: str, count: int, cycle: str | int) -> int:
+    text = str(cycle).strip().lower()
+    if text in ("first", "last"):
+        return 0 if text == "first" else count - 1
+    if text.isdecimal() and 1 <= int(text) <= count:
+        return int(text) - 1
+    if count == 1:
+        raise InputError(f"{file} has one cycle, and no '{cycle}'. Leave cycle (--cycle) out.")
+    raise InputError(f"{file} has {count} cycles; cycle must be first, last or 1 to {count}, not '{cycle}'.")
+
+
+def _cycle_labels(table: Table) -> list[str]:
+    """Return the set and the cycle of every row as in the file; nothing where it has no column of cycles.
+
+    CellScale's machines write the phase beside the number (``2-Stretch``, ``2-Recover``), which is left out.
+    """
+    cycle = [column for column, name in enumerate(table.quantities) if name in CYCLE_NAMES]
+    if len(cycle) != 1:
+        return []
+    numbers = [re.sub(r"^(\d+)-.*$", r"\1", text) for text in table.texts(cycle[0])]
+    sets = [column for column, name in enumerate(table.quantities) if name in SET_NAMES]
+    if not sets:
+        return numbers
+    return [f"{name} {number}" for name, number in zip(table.texts(sets[0]), numbers, strict=True)]

@@ -18,6 +18,13 @@ __all__ = ["STRAIN_MEASURES", "STRESS_MEASURES", "StrainMeasure", "StressMeasure
 
 FloatArray = NDArray[np.float64]
 
+ENGINEERING = (
+    r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|инженерн\w+|"
+    r"номинальн\w+|условн\w+"
+)
+TRUE = r"true|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|verdadeir[ao]|werkelijke|真实|真實|真|истинн\w+"
+"""Words for the engineering and the true strain or stress."""
+
 
 @dataclass(frozen=True)
 class StrainMeasure:
@@ -89,8 +96,7 @@ STRAIN_MEASURES = {
     for measure in (
         StrainMeasure(
             name="engineering",
-            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|unitari[ao]|"
-            r"unitaire|relative|工程|公称|инженерн\w+|номинальн\w+|условн\w+|относительн\w+",
+            words=rf"{ENGINEERING}|unitari[ao]|unitaire|relative|относительн\w+",
             stretch=lambda strain: 1 + strain,
             strain=lambda stretch: stretch - 1,
             formula="1 + {}",
@@ -99,8 +105,7 @@ STRAIN_MEASURES = {
         ),
         StrainMeasure(
             name="true",
-            words=r"true|log\.?|logar\w*|ln|hencky|natural|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|"
-            r"verdadeir[ao]|werkelijke|真实|真實|真|对数|對數|対数|истинн\w+|логарифмическ\w+",
+            words=rf"{TRUE}|log\.?|logar\w*|ln|hencky|natural|对数|對數|対数|логарифмическ\w+",
             stretch=np.exp,
             strain=np.log,
             formula="exp({})",
@@ -186,13 +191,11 @@ STRESS_MEASURES = {
     for measure in (
         StressMeasure(
             name="engineering",
-            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|инженерн\w+|номинальн\w+|условн\w+|"
-            r"pk ?1|(1st|first|1\.) (pk|piola( kirchhoff)?)",
+            words=rf"{ENGINEERING}|pk ?1|(1st|first|1\.) (pk|piola( kirchhoff)?)",
         ),
         StressMeasure(
             name="cauchy",
-            words=r"cauchy|true|kirchhoff|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|verdadeir[ao]|"
-            r"werkelijke|真实|真實|真|истинн\w+|коши",
+            words=rf"cauchy|kirchhoff|{TRUE}|коши",
             engineering=_from_cauchy,
             step="Cauchy stress divided by stretch to engineering stress",
         ),

@@ -16,10 +16,15 @@ from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
 
 __all__ = ["READING_OPTIONS", "TURNS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
 
-AXES = ("x", "y")
-"""Of a biaxial machine."""
 TURNS = {"load": ("load",), "deformation": ("deformation",), "both": ("deformation", "load")}
 """What signs may be changed of, by what asks for it."""
+NAMES_OF_OPTIONS: Mapping[str, Collection[str]] = {
+    "strain_type": STRAIN_MEASURES,
+    "stress_type": STRESS_MEASURES,
+    "axis": ("x", "y"),
+    "branch": ("loading", "unloading"),
+}
+"""What options may be that are one of some names."""
 
 
 class ReadingOptions(TypedDict, total=False):
@@ -163,10 +168,10 @@ def _as_texts(value: Any) -> Any:
     return f"{float(value.magnitude)!r} {unit_of(value)}" if is_quantity(value) else value
 
 
-def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMode:
+def checked_mode(mode_or_name: str | LoadingMode, options: ReadingOptions) -> LoadingMode:
     """Return a loading mode, once the options have been looked at that need no file."""
-    mode = loading_mode(name)
-    axis, step = options.get("axis"), options.get("every", 1)
+    mode = loading_mode(mode_or_name)
+    step = options.get("every", 1)
     if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
         raise InputError(
             f"a file is read in loading modes with one stress or two, and '{mode.name}' has "
@@ -177,6 +182,10 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
             f"compression_positive=True (--compression-positive) is for loading modes with one stress, not for "
             f"'{mode.name}'. Turn all loads: turn='load' (--turn load), or all deformations, or both."
         )
+    for option, names in NAMES_OF_OPTIONS.items():
+        name: Any = options.get(option)
+        if name is not None and name not in names:
+            raise InputError(f"{option} must be one of {', '.join(names)}, not '{name}'.")
     turn = options.get("turn")
     if turn is not None and turn not in TURNS:
         raise InputError(f"turn (--turn) must be one of {', '.join(TURNS)}, not '{turn}'.")
@@ -190,18 +199,12 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
             f"preload (--preload) does not go with loading mode '{mode.name}', where it does not say which stress "
             "carries it. Leave it out, and count stretches in the file from where the specimen is taut."
         )
-    for option, measures in (("strain_type", STRAIN_MEASURES), ("stress_type", STRESS_MEASURES)):
-        measure = options.get(option)
-        if measure is not None and measure not in measures:
-            raise InputError(f"{option} must be one of {', '.join(measures)}, not '{measure}'.")
     stretch_range = options.get("stretch_range")
     ends = np.asarray([0.0, 1.0] if stretch_range is None else stretch_range)
     if ends.shape != (2,) or not np.isfinite(ends).all() or ends[0] >= ends[1]:
         raise InputError(
             f"stretch_range (--stretch) must be a lowest and a highest stretch such as 1:1.2, not {stretch_range!r}."
         )
-    if axis is not None and axis not in AXES:
-        raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
     mean_of = options.get("mean_of")
     if mean_of is not None and (not isinstance(mean_of, int) or mean_of < 2):
         raise InputError(f"mean_of (--mean-of) must be a number of specimens, 2 or more, not {mean_of!r}.")

@@ -1,7 +1,8 @@
-"""Checks that numbers are what their columns are read as: stretches, strains, displacements, positions or lengths."""
+"""Checks that numbers are what their columns are read as, and that the specimen kept its volume."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,6 +22,9 @@ __all__ = [
     "check_positions",
     "check_strain",
     "check_stretches",
+    "poisson_ratio",
+    "readable_shares",
+    "volume_step",
 ]
 
 PLAIN_STRAIN_LIMIT = 10.0
@@ -38,18 +42,46 @@ OFFSET, NEGLIGIBLE_OFFSET = 0.05, 0.01
 TOE_ROWS, TOE = 8, 0.1
 """Rows, and share of the range of displacements, over which the load begins on a line at least."""
 STANDARD_ERRORS = 2.0
-"""How clearly the load at the first row is nearer to 0 than to where that line would have come from 0."""
+"""How clearly the load at the first row is nearer to 0 than to where that line would have come from 0, and how clearly
+Poisson's ratio is less than that of constant volume."""
 LITTLE_LOAD = 0.1
 """Share of the largest load up to which a specimen may be undeformed."""
 LEAST_CHANGE = 1e-3
 """Relative change of the length of a specimen in a test of tension or compression."""
 
+LATERAL = re.compile(r"transvers|\blateral|\bradial|\bquer|попереч|横向")
+STRETCH = re.compile(r"stretch|lambda|λ|streckung")
+STRAIN = re.compile(r"strain|dehnung|kontraktion|epsilon|ε|déformation|деформац|应变|ひずみ")
+LEAST_RATIO = 0.45
+"""Poisson's ratio below which a material is not taken as incompressible: its shear modulus is off by 3 % or more."""
+LEAST_STRAIN = 0.02
+"""Largest logarithmic strain that a specimen needs, for a ratio to be told."""
+INDEPENDENT_ROWS = 10
+"""Measurements for which the rows of a smooth curve are taken."""
+
 
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
     """Refuse columns of stretches that are not positive, or that are strains by their size."""
+    table = measured.table
     for choice, stretch in zip(choices, measured.stretch, strict=True):
-        if choice.measure not in SHEARS:
-            _check_stretch(measured.table, choice, stretch)
+        is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
+        if choice.measure in SHEARS or (is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT)):
+            continue
+        name = table.key(choice.deformation)
+        if is_strain:
+            advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
+        else:
+            advice = (
+                "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
+                f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
+            )
+        if is_positive:
+            raise InputError(
+                f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
+                f"{stretch.max():g}) look like strain, not stretch. {advice}"
+            )
+        row = int(np.flatnonzero(stretch <= 0)[0])
+        raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
 
 
 def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Column, has_unit: bool) -> None:
@@ -70,27 +102,6 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
             f'never comes near 0: it looks like a stretch. Say so: columns={{"stretch": "{name}"}} or '
             f"--column stretch={_quoted(name)}."
         )
-
-
-def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
-    is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
-    if is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT):
-        return
-    name = table.key(choice.deformation)
-    if is_strain:
-        advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
-    else:
-        advice = (
-            "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
-            f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
-        )
-    if is_positive:
-        raise InputError(
-            f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
-            f"{stretch.max():g}) look like strain, not stretch. {advice}"
-        )
-    row = int(np.flatnonzero(stretch <= 0)[0])
-    raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
 
 
 def _quoted(name: str) -> str:
@@ -155,3 +166,75 @@ def check_lengths(table: Table, choice: ColumnChoice, length: Column, unit: str 
             f"{table.place(choice.deformation)}: the specimen stays {length[0]:g} {unit} long, so this is no test of "
             "tension or compression. Give the columns of the deformation and of its load, and --mode."
         )
+
+
+def volume_step(measured: MeasuredRows, *, is_taken: bool = False) -> str:
+    """Return Poisson's ratio of a uniaxial test with lateral strains, as a step; an empty text without them.
+
+    Raises
+    ------
+    InputError
+        When they are clearly those of a material whose volume changes, which no law here describes, unless that
+        ``is_taken`` as it is.
+    """
+    table = measured.table
+    along = np.log(measured.stretch[0])
+    columns = (_lateral(table, number, along) for number in range(len(table.names)))
+    number, lateral = next(filter(None, columns), (0, np.zeros(1)))
+    if np.abs(along).max() < LEAST_STRAIN or lateral.min() <= 0:
+        return ""
+    ratio, error = poisson_ratio(along, np.log(lateral))
+    said = f"Poisson's ratio {ratio:.2f} ± {error:.2f}"
+    if ratio + STANDARD_ERRORS * error >= LEAST_RATIO:
+        return f"{said} by column {table.label(number)}"
+    if is_taken:
+        return f"taken as incompressible, though {said} by column {table.label(number)}"
+    end = int(np.argmax(np.abs(along)))
+    change = np.exp(along[end] * (1 - 2 * ratio)) - 1
+    raise InputError(
+        f"{table.place(number)}: the specimen does not keep its volume ({said}; at stretch "
+        f"{np.exp(along[end]):.3g} it changes by {100 * change:+.0f} %), while every material here is incompressible: "
+        "its modulus would be wrong. Foams and lung need a compressible law in another tool. To fit it as one of "
+        "constant volume all the same, give --incompressible."
+    )
+
+
+def poisson_ratio(along: Column, across: Column) -> tuple[float, float]:
+    """Return the ratio of logarithmic strains (n,) by least squares, and its standard error.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> strain = np.linspace(0, 0.2, 21)
+    >>> [round(number, 6) for number in poisson_ratio(strain, -0.3 * strain)]
+    [0.3, 0.0]
+    """
+    squares = float(along @ along)
+    slope = float(along @ across) / squares
+    scatter = float(((across - slope * along) ** 2).sum()) / max(len(along) - 1, 1)
+    rows = min(len(along), INDEPENDENT_ROWS)
+    return -slope, float(np.sqrt(scatter / squares * len(along) / rows))
+
+
+def readable_shares(table: Table, number: int) -> Column | None:
+    """Return a column (n,) of stretches or strains, of which percentages are shares; None where a cell is faulty."""
+    try:
+        (values,) = table.numbers([number])
+    except InputError:
+        return None
+    return values / (100 if table.unit(number) == "%" else 1)
+
+
+def _lateral(table: Table, number: int, along: Column) -> tuple[int, Column] | None:
+    """Return a column with the lateral stretches (n,) that it holds, if it is one; those with faulty cells are not.
+
+    A contraction may be written as positive.
+    """
+    quantity, unit = table.quantities[number], table.unit(number)
+    is_stretch, is_strain = bool(STRETCH.search(quantity)), bool(STRAIN.search(quantity))
+    if not LATERAL.search(quantity) or not (is_stretch or is_strain) or unit not in ("", "1", "-", "%", "mm/mm"):
+        return None
+    values = readable_shares(table, number)
+    if values is None:
+        return None
+    return number, values if is_stretch else 1 - np.sign(values @ along) * values

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, role_names
+from tissuq.experiments.modes import LoadingMode, Planar
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
-from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE
-from tissuq.experiments.reading.vocabulary import CYCLE_NAMES
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES, ROLES_OF_TUBE, other_quantity
 from tissuq.experiments.units import measured_in
 
 __all__ = [
     "DEFORMATIONS",
     "DEFORMATIONS_OF_UNITS",
+    "DIAMETERS",
     "LENGTHENINGS",
     "LOADS",
     "OTHER_MEASURE",
+    "PRESSURE",
     "SHEARS",
     "ColumnChoice",
     "Contents",
@@ -29,10 +32,12 @@ __all__ = [
     "recognise",
     "say_which",
     "told_by_unit",
+    "with_columns_of_tube",
 ]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
+*DIAMETERS, PRESSURE = ROLES_OF_TUBE
 DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
 LOADS = ("stress", "torque", "force", PRESSURE)
 DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist", "pixels": "length"}
@@ -50,6 +55,16 @@ NEITHER_LOAD_NOR_DEFORMATION = re.compile(
     + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
+
+HOW_TO_READ_TUBE = (
+    'If it was held at its undeformed length, give --mode planar --diameter "3 mm" --thickness "0.5 mm": its '
+    "undeformed outer diameter and the thickness of its wall. If it was stretched along its axis, too, convert "
+    "pressure and force with ThinTube.engineering_stresses in Python, and give these stresses with --mode thin-tube."
+)
+"""How a tube is read."""
+AXIAL_STRETCH = re.compile(r"(axial|longitudinal|z) (stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?z")
+SAME_LENGTH = 0.01
+"""Axial stretch, less one, up to which a tube counts as held at its undeformed length."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +113,7 @@ class Contents:
 
         That is the one asked for, or else the engineering one, or what does not say another.
         """
-        names = frozenset().union(*(role_names(role) for role in roles))
+        names = frozenset().union(*(ROLES[role] for role in roles))
         if "stress" in roles and self.stress_type is not None:
             names |= STRESS_NOUNS | COMPONENTS["stress"]
         if "strain" in roles and self.strain_type is not None:
@@ -132,7 +147,7 @@ def told_by_unit(
         if len(columns) == 1 and (load is None or rivals == columns or kind == "angle"):
             name = contents.quantities[columns[0]]
             is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
-            return None if is_open or name in role_names("shear") else (kind, columns[0])
+            return None if is_open or name in ROLES["shear"] else (kind, columns[0])
     return None
 
 
@@ -140,19 +155,12 @@ def _by_unit(table: Table, quantities: Sequence[str]) -> dict[str, list[int]]:
     """Return the columns that vary, and that no name says are of something else, by the kind of their unit."""
     columns_of: dict[str, list[int]] = {}
     for column, quantity in enumerate(quantities):
-        is_other = _is_of_something_else(quantity) or other_quantity(quantity, table.unit(column))
+        unit = table.unit(column)
+        is_other = quantity in CYCLE_NAMES or bool(dimensions_named(quantity) or other_quantity(quantity, unit))
+        is_other = is_other or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
         if not is_other and not table.is_constant(column):
-            columns_of.setdefault(measured_in(table.unit(column)), []).append(column)
+            columns_of.setdefault(measured_in(unit), []).append(column)
     return columns_of
-
-
-def _is_of_something_else(quantity: str) -> bool:
-    """Tell whether a name is of a dimension of the specimen, a count, a time or a modulus."""
-    return (
-        quantity in CYCLE_NAMES
-        or bool(dimensions_named(quantity))
-        or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
-    )
 
 
 def recognise(
@@ -201,7 +209,7 @@ def _of_other_quantities(table: Table, roles: Sequence[str]) -> str:
 
 def _stress_hint(table: Table, contents: Contents) -> str:
     for column, quantity in enumerate(contents.quantities):
-        if quantity in role_names("torque"):
+        if quantity in ROLES["torque"]:
             return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
         if IS_PRESSURE.search(quantity):
             return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
@@ -253,3 +261,77 @@ def _how_to_say(table: Table, roles: Sequence[str]) -> str:
         )
     more = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
     return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{more}.'
+
+
+def with_columns_of_tube(
+    table: Table, mode: LoadingMode, mapping: Mapping[str, str | int], quantities: Sequence[str]
+) -> dict[str, str | int]:
+    """Return the roles of columns with those of a tube, its pressure and a diameter, where the table is of one.
+
+    Parameters
+    ----------
+    table : Table
+    mode : LoadingMode
+    mapping : mapping
+        The roles that are given.
+    quantities : sequence of str
+        What the columns' names say they hold.
+
+    Raises
+    ------
+    InputError
+        When one of both columns is missing, or the loading mode is none of a tube.
+    """
+    tube_roles, other_roles = (
+        [role for role in mapping if (role in ROLES_OF_TUBE) is is_given] for is_given in (True, False)
+    )
+    if not tube_roles and (other_roles or len(mode.stresses) > 1):
+        return dict(mapping)
+    by_role = {role: columns for role in ROLES_OF_TUBE if (columns := list(_columns_of_tube(table, quantities, role)))}
+    has_both = PRESSURE in by_role and not by_role.keys().isdisjoint(DIAMETERS)
+    if not tube_roles and (not has_both or not ROLES["stress"].isdisjoint(quantities)):
+        return dict(mapping)
+    if other_roles:
+        raise InputError(
+            f"{table.file}: columns are given as {tube_roles[0]} and as {other_roles[0]}, which do not go together: of "
+            "a tube give a pressure and a diameter (--column pressure=NAME --column outer_diameter=NAME)."
+        )
+    diameter = next((role for roles in (mapping, by_role) for role in DIAMETERS if role in roles), DIAMETERS[0])
+    for role in (PRESSURE, diameter):
+        columns = by_role.get(role, [])
+        if role not in mapping and len(columns) != 1:
+            labels = " and ".join(map(table.label, columns))
+            fault = f"columns {labels} may each be" if labels else "no column is recognised as"
+            raise InputError(
+                f"{table.file}: {fault} the {role.replace('_', ' ')} of a tube. Say which it is: --column {role}=NAME."
+            )
+    if not isinstance(mode, Planar):
+        names = " and ".join(table.label(by_role[role][0]) for role in (PRESSURE, diameter) if role in by_role)
+        advice = "" if tube_roles else " To read other columns, say which: --column stretch=NAME --column force=NAME."
+        raise InputError(f"{table.file} is of a tube under pressure ({names}). {HOW_TO_READ_TUBE}{advice}")
+    _check_length_of_tube(table)
+    return {role: mapping.get(role, by_role.get(role, [0])[0] + 1) for role in (PRESSURE, diameter)}
+
+
+def _columns_of_tube(table: Table, quantities: Sequence[str], role: str) -> Iterator[int]:
+    """Yield the columns that change and whose names have a role, or whose unit is one of pressures alone."""
+    names = ROLES[role]
+    is_named = any(quantity in names for quantity in quantities)
+    for column, quantity in enumerate(quantities):
+        is_one = quantity in names if is_named or role != PRESSURE else measured_in(table.unit(column)) == PRESSURE
+        if is_one and not table.is_constant(column):
+            yield column
+
+
+def _check_length_of_tube(table: Table) -> None:
+    """Refuse a tube whose axial stretch the table says, and that is not one."""
+    for column, quantity in enumerate(table.quantities):
+        if not AXIAL_STRETCH.fullmatch(quantity):
+            continue
+        (stretch,) = table.numbers([column])
+        row = int(np.argmax(np.abs(stretch - 1)))
+        if abs(stretch[row] - 1) > SAME_LENGTH:
+            raise InputError(
+                f"{table.place(column, row)}: the axial stretch is {stretch[row]:g}, and in loading mode 'planar' a "
+                f"tube keeps its undeformed length. {HOW_TO_READ_TUBE}"
+            )

@@ -10,10 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.modes.mode import STRETCH, Control, LoadingMode
-from tissuq.experiments.reading.cycles import Cycle, find_cycles
-from tissuq.experiments.reading.events import Event, find_holds, find_rupture, find_slips
-from tissuq.experiments.reading.load_cell import find_drift, find_outliers, find_saturation, staircase_of, step_of
-from tissuq.experiments.reading.measured_rows import COUNTED_FROM, MeasuredRows
+from tissuq.experiments.reading.disturbances import (
+    UNIFORM_SD,
+    Event,
+    find_drift,
+    find_holds,
+    find_outliers,
+    find_rupture,
+    find_saturation,
+    find_slips,
+    staircase_of,
+    step_of,
+)
+from tissuq.experiments.reading.measured_rows import COUNTED_FROM, Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.slack import Slack, find_slack
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import StressUnit
@@ -31,8 +40,6 @@ RESTART = 0.5
 """Share of a cycle's range from which the step to the next one is no unloading: the test begins anew."""
 FEWEST_RELAXED = 3
 """Holds from which their ends are a test by themselves."""
-UNIFORM_SD = 12**-0.5
-"""Standard deviation of an error that is even over a step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.arrangement import names_above
 from tissuq.experiments.reading.headings import (
     AXES,
     is_of_mean,
@@ -13,16 +16,15 @@ from tissuq.experiments.reading.headings import (
     measure_in,
     of_spread,
     on_lettered_axis,
-    role_names,
     without_mean,
 )
-from tissuq.experiments.reading.lines_above import names_above
-from tissuq.experiments.reading.other_quantities import other_quantity
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.vocabulary import ROLES, other_quantity
 from tissuq.experiments.units import measured_in
 
-__all__ = ["ColumnsOfTest", "columns_named_again", "columns_side_by_side"]
+__all__ = ["ColumnsOfTest", "TestBeside", "columns_named_again", "columns_side_by_side", "test_beside"]
 
 PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
 """Words and capacities that tell one load cell from another, and not tests."""
@@ -41,6 +43,25 @@ class ColumnsOfTest(NamedTuple):
     columns: Mapping[str, str | int]
 
 
+class TestBeside(NamedTuple):
+    """One of several tests side by side in a table: its name, its column of loads, and those of all tests."""
+
+    name: str
+    load: int
+    names: Sequence[str]
+    loads: Sequence[int]
+
+    @property
+    def number(self) -> str:
+        """The digits in its name."""
+        return re.sub(r"\D", "", self.name)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Those in the names of all tests."""
+        return [re.sub(r"\D", "", name) for name in self.names]
+
+
 class _Role(NamedTuple):
     """What a column's name says that it holds, and of which test."""
 
@@ -48,15 +69,15 @@ class _Role(NamedTuple):
     test: str
 
 
-def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: bool) -> list[ColumnsOfTest]:
+def columns_side_by_side(table: Table, mode: LoadingMode, options: ReadingOptions) -> list[ColumnsOfTest]:
     """Return the columns of every test where a table has several beside one another; nothing where it has one.
 
     They are a stress or force for each test, and a deformation for each or one for all. Their names are the same, or
     differ in the number, letter or name of a specimen; the names of the tests may stand in the line above. Columns of
     loads that are known by their units alone are of specimens, or means of groups, beside one deformation of all.
     """
-    deformations = ("shear",) if is_shear else LENGTHENINGS
-    roles = [_role(quantity, (*deformations, *LOADS), stress_type) for quantity in table.quantities]
+    deformations = ("shear",) if mode.controls == (SHEAR,) else LENGTHENINGS
+    roles = [_role(name, (*deformations, *LOADS), options.get("stress_type")) for name in table.quantities]
     measure, measures = _columns_of_first(deformations, roles)
     is_by_unit = len(measures) == 1 and not any(role.role in LOADS for role in roles)
     if is_by_unit:
@@ -82,6 +103,16 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
         ColumnsOfTest(name, {measure: deformation + 1, load: stress + 1})
         for name, (deformation, stress) in zip(names, pairs, strict=True)
     ]
+
+
+def test_beside(table: Table, load: int, mode: LoadingMode, options: ReadingOptions) -> TestBeside | None:
+    """Return which of several tests in a table has a column of loads; None where the table holds one test."""
+    tests = columns_side_by_side(table, mode, options)
+    loads = [int(column) - 1 for test in tests for column in [*test.columns.values()][1:]]
+    if load not in loads:
+        return None
+    names = [test.name for test in tests]
+    return TestBeside(names[loads.index(load)], load, names, loads)
 
 
 def columns_named_again(table: Table, columns: Mapping[str, str | int]) -> list[ColumnsOfTest]:
@@ -118,7 +149,7 @@ def _role(quantity: str, roles: Sequence[str], stress_type: str | None) -> _Role
         quantity_alone, measure = measure_in(words)
         for role in roles:
             wanted = stress_type if role == "stress" else None
-            if quantity_alone in role_names(role) and measure in ("", wanted or "engineering"):
+            if quantity_alone in ROLES[role] and measure in ("", wanted or "engineering"):
                 return _Role(role, test)
     return _Role("", "")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
-from tissuq.experiments.reading.options import TURNS
+from tissuq.experiments.reading.options import TURNS, ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
@@ -34,24 +34,13 @@ NOTABLE_SHARE = 0.1
 
 
 def with_signs(
-    measured: MeasuredRows,
-    choices: Sequence[ColumnChoice],
-    compression_positive: bool | None,
-    turn: str | None,
-    direction: str,
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions, direction: str
 ) -> MeasuredRows:
     """Return the rows with lengthening and tension positive: some signs of the file turned.
 
-    Parameters
-    ----------
-    measured : MeasuredRows
-    choices : sequence of ColumnChoice
-    compression_positive : bool or None
-        Whether the file counts compression as positive; then the rows tell what is turned.
-    turn : str or None
-        What is turned, by a name in `TURNS`, whatever the rows tell.
-    direction : str
-        That of the load as names say it: compression, tension or an empty text.
+    An option says whether the file counts compression as positive, and then the rows tell what is turned; or another
+    one what is, whatever the rows tell. The direction is that of the load as names say it: compression, tension or an
+    empty text.
 
     Raises
     ------
@@ -59,6 +48,7 @@ def with_signs(
         When what is asked for has no meaning for the columns, or would change nothing, or a name says compression and
         nobody says its sign.
     """
+    compression_positive, turn = options.get("compression_positive"), options.get("turn")
     if turn is not None:
         return _turned(measured, choices, TURNS[turn], "as asked")
     if choices[0].measure in SHEARS or choices[0].load == "pressure":
@@ -70,8 +60,10 @@ def with_signs(
         _check_names(measured, choices, direction)
         return measured
     if not compression_positive:
-        falls = choices[0].measure in ("strain", "displacement") and _falls_in_tension(measured)
-        return _turned(measured, choices, ("deformation",), "tension is positive") if falls else measured
+        strain, stress = measured.stretch - 1, measured.stress
+        falls = float((stress * strain).sum()) < 0 and strain.max() < -NEGLIGIBLE_STRAIN * strain.min()
+        is_turned = choices[0].measure in ("strain", "displacement") and falls and stress.sum() > 0
+        return _turned(measured, choices, ("deformation",), "tension is positive") if is_turned else measured
     return _with_compression_negative(measured, choices)
 
 
@@ -100,13 +92,6 @@ def _with_compression_negative(measured: MeasuredRows, choices: Sequence[ColumnC
         stress = np.where(strain < 0, -measured.stress, measured.stress)
         return replace(measured, stress=stress).with_step("sign changed at stretch < 1")
     return _turned(measured, choices, TURNS["both" if in_tension > 0 and not says_direction else "load"], why)
-
-
-def _falls_in_tension(measured: MeasuredRows) -> bool:
-    """Tell whether strains are negative where the load is positive all along."""
-    strain = measured.stretch - 1
-    is_turned = float((measured.stress * strain).sum()) < 0 and strain.max() < -NEGLIGIBLE_STRAIN * strain.min()
-    return bool(is_turned and measured.stress.sum() > 0)
 
 
 def _turned(measured: MeasuredRows, choices: Sequence[ColumnChoice], what: Sequence[str], why: str) -> MeasuredRows:
@@ -164,20 +149,16 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
 
 
 def check_signs(
-    measured: MeasuredRows,
-    choices: Sequence[ColumnChoice],
-    compression_positive: bool,
-    turn: str | None,
-    unit: StressUnit,
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions, unit: StressUnit
 ) -> None:
     """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for.
 
     Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
     """
     try:
-        _check_work(measured, choices, compression_positive, unit)
+        _check_work(measured, choices, bool(options.get("compression_positive")), unit)
     except InputError as error:
-        if turn is None:
+        if (turn := options.get("turn")) is None:
             raise
         raise InputError(
             f"{error} (Signs are turned as asked, --turn {turn}: turn others, or leave it out.)"
@@ -187,11 +168,24 @@ def check_signs(
 def _check_work(
     measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, unit: StressUnit
 ) -> None:
-    if choices[0].measure in SHEARS:
-        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0], unit)
+    choice, stretch, stress = choices[0], measured.stretch[0], measured.stress[0]
+    if choice.measure in SHEARS:
+        row = _wrong_sign(1 + stretch, stress, np.ones(len(stretch), dtype=bool))
+        if row is not None:
+            raise InputError(
+                f"{measured.table.place(choice.stress, row)}: at an amount of shear of {stretch[row]:g} the shear "
+                f"stress is {unit.written(stress[row])}; it must have the sign of the shear. Turn one of them, "
+                "turn='load' (--turn load), or check which columns are read."
+            )
         return
-    if choices[0].load == "pressure":
-        _check_inflation(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+    if choice.load == "pressure":
+        row = _wrong_sign(stretch, stress, stretch < 1)
+        if row is not None:
+            raise InputError(
+                f"{measured.table.place(choice.deformation, row)}: the tube is under pressure and narrower than "
+                f"undeformed (stretch {stretch[row]:g} in the middle of the wall). Give the outer diameter that it has "
+                "without pressure (--diameter), or check which columns are read."
+            )
         return
     change = measured.stretch - 1
     alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
@@ -247,26 +241,6 @@ def _check_signs(
         raise InputError(
             f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
             f"is negative ({unit.written(stress[row])}); tension must be positive. {advice}"
-        )
-
-
-def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column, unit: StressUnit) -> None:
-    row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
-    if row is not None:
-        raise InputError(
-            f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
-            f"{unit.written(stress[row])}; it must have the sign of the shear. Turn one of them, turn='load' "
-            "(--turn load), or check which columns are read."
-        )
-
-
-def _check_inflation(table: Table, choice: ColumnChoice, stretch: Column, stress: Column) -> None:
-    row = _wrong_sign(stretch, stress, stretch < 1)
-    if row is not None:
-        raise InputError(
-            f"{table.place(choice.deformation, row)}: the tube is under pressure and narrower than undeformed (stretch "
-            f"{stretch[row]:g} in the middle of the wall). Give the outer diameter that it has without pressure "
-            "(--diameter), or check which columns are read."
         )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tissuq.experiments.reading.load_cell import averaged
+from tissuq.experiments.reading.disturbances import averaged
 from tissuq.experiments.reading.table import Column
 
 __all__ = ["Slack", "find_slack"]

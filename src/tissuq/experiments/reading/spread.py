@@ -10,11 +10,11 @@ from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import find_column
-from tissuq.experiments.reading.headings import is_of_count, is_of_mean, of_spread, role_names, without_mean
+from tissuq.experiments.reading.headings import is_of_mean, of_spread, without_mean
 from tissuq.experiments.reading.loads import Load
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.vocabulary import SPREADS
+from tissuq.experiments.reading.vocabulary import COUNT_NAMES, ROLES, SPREADS
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
 __all__ = ["Spread", "spread_of"]
@@ -78,10 +78,7 @@ def spread_of(
             return spread
         unused = f"column {table.label(spread.column)} is not used: standard deviations and standard errors"
         return replace(spread, problem=f"{unused} are taken of stresses or forces, not of {of_load}.")
-    if wanted:
-        column = find_column(table, wanted, mapping[wanted])
-        return _with_errors(table, choice, Spread(column, wanted), mapping, load, mean_of)
-    spread = _recognised(table, choice)
+    spread = Spread(find_column(table, wanted, mapping[wanted]), wanted) if wanted else _recognised(table, choice)
     if spread.column is None and mean_of is not None:
         raise InputError(
             f"{table.file}: mean_of={mean_of} (--mean-of) is for standard deviations beside a mean, and no column is "
@@ -92,6 +89,8 @@ def spread_of(
     try:
         return _with_errors(table, choice, spread, mapping, load, mean_of)
     except InputError as error:
+        if wanted:
+            raise
         return replace(spread, problem=f"{error} So the column is not used.")
 
 
@@ -110,7 +109,7 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
         is_of_load = measured_in(table.unit(column)) in ("", choice.load) and of_what in (
             "",
             without_mean(of_stress),
-            *role_names(choice.load),
+            *ROLES[choice.load],
         )
         if kind and is_of_load and not table.is_constant(column):
             by_kind.setdefault(kind, []).append(column)
@@ -165,7 +164,7 @@ def _count(table: Table, mapping: Mapping[str, str | int], mean_of: int | None) 
     """Return the number of specimens in every row, or of all, and where it comes from; None where nobody says it."""
     if mean_of is not None:
         return np.array(float(mean_of)), f"{mean_of} (as given)"
-    columns = [column for column, quantity in enumerate(table.quantities) if is_of_count(quantity)]
+    columns = [column for column, quantity in enumerate(table.quantities) if COUNT_NAMES.fullmatch(quantity)]
     if "n" in mapping:
         columns = [find_column(table, "n", mapping["n"])]
     if len(columns) != 1:

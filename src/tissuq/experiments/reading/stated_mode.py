@@ -10,17 +10,11 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_modes
-from tissuq.experiments.reading.headings import (
-    NEXT_WORD,
-    STRESS_NOUNS,
-    heading,
-    measure_in,
-    on_lettered_axis,
-    role_names,
-)
+from tissuq.experiments.reading.headings import NEXT_WORD, STRESS_NOUNS, heading, measure_in, on_lettered_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.vocabulary import ROLES
 
 __all__ = [
     "DEFAULT_MODE",
@@ -120,8 +114,10 @@ def mode_of(
     if (wanted := options.get("mode")) is not None:
         return wanted, GIVEN
     mode, source = "", ""
-    if not mode_in_comment(Path(file)):
-        mode, source = _mode_in_column(table)
+    for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
+        if len(modes := modes_in_column(table, column)) == 1:
+            mode, source = modes.pop(), f"column {table.label(column)}"
+            break
     if not mode:
         mode, source = find_mode(file, [table.sheet, table.title, *words])
     columns = options.get("columns") or {}
@@ -154,7 +150,7 @@ def direction_of(*texts: str) -> str:
 
 def is_torque(name: str) -> bool:
     """Return whether the name of a column is that of a torque."""
-    return measure_in(heading(name).quantity)[0] in role_names("torque")
+    return measure_in(heading(name).quantity)[0] in ROLES["torque"]
 
 
 def check_not_sheared(table: Table) -> None:
@@ -180,31 +176,21 @@ def about_mode(mode: str, source: str) -> Iterator[None]:
         raise InputError(f"{error} (The loading mode {mode} is from {source}; give --mode for another.)") from error
 
 
-def _mode_in_column(table: Table) -> tuple[str, str]:
-    """Return the mode that a column names in all rows that say one, and which column; empty texts for several."""
-    for column in range(len(table.names)):
-        modes = modes_in_column(table, column)
-        if len(modes) == 1:
-            return modes.pop(), f"column {table.label(column)}"
-    return "", ""
-
-
 def _mode_of_columns(table: Table) -> tuple[str, str]:
     """Return the mode that the columns of a table leave no choice about, and why; empty texts where they do."""
     quantities = [measure_in(quantity)[0] for quantity in table.quantities]
-    deformations = role_names("stretch") | role_names("strain") | role_names("displacement")
+    deformations = ROLES["stretch"] | ROLES["strain"] | ROLES["displacement"]
     on_axes = [on_lettered_axis(quantity) for quantity in quantities]
-    loads = role_names("stress") | STRESS_NOUNS | role_names("force")
+    loads = ROLES["stress"] | STRESS_NOUNS | ROLES["force"]
     if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
         return "biaxial", "columns of both axes"
     stretches, shears, twists = (
-        names & set(quantities)
-        for names in (deformations, role_names("shear") | role_names("sliding"), role_names("twist"))
+        names & set(quantities) for names in (deformations, ROLES["shear"] | ROLES["sliding"], ROLES["twist"])
     )
     if not stretches and len(shears) == 1:
         return "simple-shear", "a column of shear"
-    is_disc = not stretches and len(twists) == 1 and len(role_names("torque") & set(quantities)) == 1
-    gaps = [column for column, quantity in enumerate(quantities) if quantity in role_names("length")]
+    is_disc = not stretches and len(twists) == 1 and len(ROLES["torque"] & set(quantities)) == 1
+    gaps = [column for column, quantity in enumerate(quantities) if quantity in ROLES["length"]]
     if not is_disc or any(map(table.varies, gaps)):
         return "", ""
     return "simple-shear", "columns of twist and torque"

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 from math import prod
 
 from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
+from tissuq.experiments.reading.arrangement import names_above
 from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
-from tissuq.experiments.reading.lines_above import names_above
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, are_named, numbered, sizes_in_line
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.side_by_side import TestBeside
+from tissuq.experiments.reading.table import Table, padded
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
-from tissuq.experiments.units import AREA, LENGTH, Quantity
+from tissuq.experiments.units import AREA, LENGTH, Quantity, looks_like_unit
 
 __all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "stated_sizes"]
 
@@ -43,6 +43,15 @@ NAMES_OF_SIDES = {"l": "length", "b": "width", "w": "width", "h": "thickness", "
 """Symbols of the sides of a specimen in a product, as in ``b x h: 5 x 2 mm``."""
 LONGEST_QUOTE = 60
 """Characters of a line that a message shows."""
+
+NUMBERED = re.compile(
+    r"(?P<name>[^\d]*[^\W\d]{2}[^\d]*?)[\s_]*(?:(?:[#№]|\bn[or]\.?)\s*)?(?P<number>[1-9])\s*(?P<unit>[\[(][^\])]*[\])])?"
+)
+"""As in ``Width 2 (mm)`` and ``Thickness #1``; two letters at least, so not ``L0``."""
+LONGEST_NAME = 80
+"""Characters of the name of a size."""
+SizesInLine = Sequence[tuple[str, int]]
+"""Values of one size in a line, each with the column from which on what stands beneath it belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +111,7 @@ def _of_test(size: StatedSize, sizes: Sequence[StatedSize], test: TestBeside) ->
             name_of_size = plain(re.sub(rf"(?<!\w){re.escape(plain(name))}(?!\w)", " ", size.name))
             if name_of_size != size.name and dimensions_named(name_of_size, is_cylinder=True):
                 return replace(size, name=name_of_size) if name == test.name else None
-    numbers = {
-        same_size.measurement for same_size in sizes if (same_size.name, same_size.kind) == (size.name, size.kind)
-    }
+    numbers = {same.measurement for same in sizes if (same.name, same.kind) == (size.name, size.kind)}
     if not size.measurement or len(numbers) < len(test.loads):
         return size
     if numbers == set(test.numbers) and size.measurement != test.number:
@@ -119,12 +126,7 @@ def names_of_specimen(
     columns = [k for k, quantity in enumerate(table.quantities) if is_of_specimens(quantity)]
     cells = [set(table.texts(column)) - {""} for column in columns]
     wanted = [str(value) for name, value in (only or {}).items() if plain(name) not in CYCLE_NAMES | SET_NAMES]
-    names = [
-        table.sheet,
-        table.title,
-        *wanted,
-        *(cell for values in cells if len(values) == 1 for cell in values),
-    ]
+    names = [table.sheet, table.title, *wanted, *(cell for values in cells if len(values) == 1 for cell in values)]
     loads = [k for k, name in enumerate(table.names) if name == table.names[choices[0].stress]]
     if len(loads) > 1 and (names_over := names_above(table, loads)):
         names.append(names_over[loads.index(choices[0].stress)])
@@ -134,21 +136,24 @@ def names_of_specimen(
 def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     """Yield what lines above the table state: ``Width : 5 mm``, ``"Probendicke";1,55;"mm"``, or less clear ones."""
     is_of_one = not table.number and not any(map(is_of_specimens, table.quantities))
-    for line, text in table.head:
+    for position, (line, text) in enumerate(table.head):
         text, source = text.lstrip("# "), f"in line {line}"
-        if several := sizes_in_line(text, table.separator):
-            for sizes in several:
-                is_measured_again = is_of_one and not are_named(sizes, table)
-                yield from _of_several(sizes, test, source, is_measured_again=is_measured_again)
+        beneath = (split(later.lstrip("# "), table.separator) for _, later in table.head[position + 1 : position + 3])
+        if any(_are_names_of(row, split(text, table.separator)) for row in beneath):
+            continue
+        if several := _sizes_in_line(text, table.separator):
+            for name, values in several.items():
+                are_measured_again = is_of_one and not test and not _are_named(values, table)
+                yield from _of_several(name, values, test, source, are_measured_again=are_measured_again)
             continue
         cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
         statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
         words = list(_words(statements))
         pairs = zip(words, words[1:], [*words[2:], ("", "")], strict=False)
         clear = [
-            replace(size, measurement=measurement if is_of_one or test else "")
+            size
             for (name, measurement), (number, _), (unit, _) in pairs
-            for size in _of_words(name, number, unit, source)
+            for size in _of_words(name, number, unit, source, measurement if is_of_one or test else "")
         ]
         yield from clear if clear else _among_words(text, source)
 
@@ -166,22 +171,21 @@ def _words(statements: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _of_several(
-    sizes: SizesInLine, test: TestBeside | None, source: str, *, is_measured_again: bool
+    name: str, values: SizesInLine, test: TestBeside | None, source: str, *, are_measured_again: bool
 ) -> Iterator[StatedSize]:
     """Yield the value of a test of several that a line states, or all: of one specimen they are its measurements."""
-    if test and (text := sizes.over(test)) is not None:
-        yield from _sizes(heading(sizes.name), text, f"{source}, over its columns", f"{sizes.name}: {text}")
+    if test and (text := _over(values, test)) is not None:
+        yield from _sizes(heading(name), text, f"{source}, over its columns", f"{name}: {text}")
         return
-    for number, value in enumerate(sizes.values, 1):
-        for size in _sizes(heading(sizes.name), value.text, source, f"{sizes.name}: {value.text}"):
-            yield replace(size, measurement=str(number) if is_measured_again and not test else "")
+    for number, (text, _) in enumerate(values, 1):
+        yield from _sizes(heading(name), text, source, f"{name}: {text}", str(number) if are_measured_again else "")
 
 
-def _of_words(name: str, number: str, unit: str, source: str) -> list[StatedSize]:
-    """Return the sizes that a name, and what follows it, state; the unit is with one of them, or comes next."""
-    for text in (f"{number} {unit}", number):
+def _of_words(name: str, number: str, unit: str, source: str, measurement: str) -> list[StatedSize]:
+    """Return the sizes that a name, and what follows it, state; the unit is with one of them, or beside the number."""
+    for text in (f"{number} {unit}", number, f"{unit} {number}"):
         value = DEVIATION.sub("", text)
-        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}"):
+        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}", measurement):
             return sizes
     return []
 
@@ -206,8 +210,18 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
             continue
         value, source = next(iter(cells)), f"in column {table.label(column)}"
         for unit in table.stated_units(column):
-            sizes = _sizes(Heading(quantity, unit), value, source, f"{name}: {value}")
-            yield from (replace(size, measurement=measurement) for size in sizes)
+            yield from _sizes(Heading(quantity, unit), value, source, f"{name}: {value}", measurement)
+
+
+def _is_size(name: Heading) -> bool:
+    """Tell whether a heading is of a size of specimens, or of one of its measurements."""
+    return bool(dimensions_named(numbered(name.quantity)[0]))
+
+
+def _are_names_of(row: list[str], cells: Sequence[str]) -> bool:
+    """Tell whether cells name sizes, each over a number in a row beneath them: ``Width 1 (mm)`` states none there."""
+    sizes = [column for column, cell in enumerate(cells) if _is_size(heading(cell))]
+    return bool(sizes) and all(map(NUMBER.fullmatch, padded(row, len(cells))[sizes[0] : sizes[-1] + 1]))
 
 
 def _only_specimen(table: Table) -> set[str]:
@@ -217,7 +231,7 @@ def _only_specimen(table: Table) -> set[str]:
         cells = split(text.lstrip("# "), table.separator)
         if any(map(NUMBER.fullmatch, cells)):
             names |= {plain(cells[0])} if is_beneath else set()
-        elif any(dimensions_named(heading(cell).quantity) for cell in cells[1:]):
+        elif any(map(_is_size, map(heading, cells[1:]))):
             is_beneath = True
     return names if len(names) == 1 else set()
 
@@ -234,8 +248,7 @@ def _of_specimens(
     for line, text in lines:
         cells = split(text.lstrip("# "), table.separator)
         if not any(map(NUMBER.fullmatch, cells)):
-            named = {k: heading(cell) for k, cell in enumerate(cells) if k}
-            headings = {k: name for k, name in named.items() if dimensions_named(numbered(name.quantity)[0])}
+            headings = {k: name for k, name in enumerate(map(heading, cells)) if _is_size(name)}
             units = {k: cells[k].strip("[]()") for k in names if k < len(cells)}
             if not headings and any(kind.factor_or_none(unit) for unit in units.values() for kind in (LENGTH, AREA)):
                 names = {k: Heading(name.quantity, units.get(k) or name.unit) for k, name in names.items()}
@@ -249,26 +262,94 @@ def _of_specimens(
                     name = Heading(name.quantity, *in_table)
                     source = f"{stated_in} ({name.unit} {UNIT_ASSUMED}"
                 quantity, measurement = numbered(name.quantity)
-                sizes = _sizes(Heading(quantity, name.unit), cells[column], source, f"{name.quantity}: {cells[column]}")
-                yield from (replace(size, measurement=measurement) for size in sizes)
+                shown = f"{name.quantity}: {cells[column]}"
+                yield from _sizes(Heading(quantity, name.unit), cells[column], source, shown, measurement)
 
 
-def _sizes(name: Heading, text: str, source: str, shown: str) -> list[StatedSize]:
+def _sizes(name: Heading, text: str, source: str, shown: str, measurement: str = "") -> list[StatedSize]:
     """Return the length or the area that a text states, in the unit there or beside the name; nothing for others.
 
     Of a product such as ``5 x 2 mm`` they are the sizes that the name has for its factors, or else the area of two.
     """
+    values = list[tuple[str, Quantity, float]]()
     sides, unit = sides_and_unit(text)
     if sides and min(sides) > 0 and (factor := LENGTH.factor_or_none(unit or name.unit)):
         names = [NAMES_OF_SIDES.get(side, side) for side in re.split(CROSS_OF_NAMES, name.quantity)]
         if len(names) == len(sides):
-            pairs = zip(names, sides, strict=True)
-            return [StatedSize(side, LENGTH, number * factor, source, shown) for side, number in pairs]
-        is_area = len(sides) == 2
-        return [StatedSize(name.quantity, AREA, prod(sides) * factor**2, source, shown)] if is_area else []
-    number, unit = number_and_unit(text)
-    for kind in (LENGTH, AREA):
-        factor = kind.factor_or_none(unit or name.unit)
-        if number and number > 0 and factor:
-            return [StatedSize(name.quantity, kind, number * factor, source, shown)]
-    return []
+            values = [(side, LENGTH, number * factor) for side, number in zip(names, sides, strict=True)]
+        elif len(sides) == 2:
+            values = [(name.quantity, AREA, prod(sides) * factor**2)]
+    else:
+        number, unit = number_and_unit(text)
+        factors = [(kind, kind.factor_or_none(unit or name.unit)) for kind in (LENGTH, AREA)]
+        values = [(name.quantity, kind, (number or 0.0) * factor) for kind, factor in factors if factor]
+    return [StatedSize(*value, source, shown, measurement) for value in values if value[2] > 0]
+
+
+def _over(values: SizesInLine, test: TestBeside) -> str | None:
+    """Return the value over the columns of a test; None where not every test has one, and every value a test."""
+    owners = [sum(column <= load for _, column in values) - 1 for load in test.loads]
+    if sorted(owners) != list(range(len(values))):
+        return None
+    return values[owners[test.loads.index(test.load)]][0]
+
+
+def numbered(name: str) -> tuple[str, str]:
+    """Return the name of a size without the number of its measurement, and that number; others as they are.
+
+    Examples
+    --------
+    >>> numbered("Width 2 (mm)"), numbered("Thickness #1"), numbered("thickness 3"), numbered("L0"), numbered("Step 2")
+    (('Width (mm)', '2'), ('Thickness', '1'), ('thickness', '3'), ('L0', ''), ('Step 2', ''))
+    """
+    match = NUMBERED.fullmatch(name.strip()) if len(name) <= LONGEST_NAME else None
+    if match and dimensions_named(plain(match["name"]), is_cylinder=True):
+        return " ".join(filter(None, (match["name"].strip(), match["unit"]))), match["number"]
+    return name, ""
+
+
+def _are_named(values: SizesInLine, table: Table) -> bool:
+    """Tell whether another line above a table names what stands in the columns of values, as those of specimens."""
+    columns = [column for _, column in values]
+    for _, text in table.head:
+        cells = split(text, table.separator)
+        if set(table.names) & {*cells} - {""}:
+            continue
+        over = [cells[column] for column in columns if column < len(cells)]
+        label = heading(cells[0]).quantity if cells else ""
+        if is_of_specimens(label) and sum(map(bool, over)) > 1:
+            return True
+        words = [cell for cell in over if cell and number_and_unit(cell)[0] is None and not looks_like_unit(cell)]
+        if len(words) > 1 and len(set(columns)) > 1:
+            return True
+    return False
+
+
+def _sizes_in_line(text: str, separator: str) -> dict[str, SizesInLine]:
+    """Return the sizes of which a line states more than one value, each in a cell, by their names.
+
+    Where those at the end of a line without cells belong is not told by their columns.
+    """
+    if separator == WHITESPACE:
+        words = text.split()
+        count = next((k for k, word in enumerate(reversed(words)) if not NUMBER.fullmatch(word)), len(words))
+        name = " ".join(words[: len(words) - count]).rstrip(" :=")
+        is_size = bool(dimensions_named(heading(name).quantity, is_cylinder=True))
+        return {name: [(number, 0) for number in words[-count:]]} if count > 1 and is_size else {}
+    label, of_label = "", -1
+    values, labels = dict[str, list[tuple[str, int, int]]](), list[str]()
+    cells = enumerate(split(text, separator))
+    for column, word in ((column, word.strip()) for column, cell in cells for word in re.split("[:=]", cell)):
+        is_value = number_and_unit(word)[0] is not None
+        if is_value and label:
+            values.setdefault(label, []).append((word, column, of_label))
+            of_label = column + 1
+        elif word and not is_value and not looks_like_unit(word):
+            label = word if dimensions_named(heading(word).quantity, is_cylinder=True) else ""
+            of_label = column
+            labels.append(label)
+    return {
+        name: [(cell, start if labels.count(name) > 1 else column) for cell, column, start in cells]
+        for name, cells in values.items()
+        if len(cells) > 1
+    }

@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.headings import heading
-from tissuq.experiments.reading.layout import (
-    MISSING,
-    SPREADSHEET_ERRORS,
-    WHITESPACE,
-    joined,
-    split,
-)
+from tissuq.experiments.reading.layout import MISSING, SPREADSHEET_ERRORS, WHITESPACE, joined, split
 from tissuq.experiments.units import BRACKETS
 
 __all__ = ["Column", "Lines", "Table", "filled_on", "padded", "rows_in"]

@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.arrangement import blocks_of, joined_where_they_go_on, transposed_table
+from tissuq.experiments.numbers import NUMBER
+from tissuq.experiments.reading.arrangement import (
+    blocks_of,
+    joined_where_they_go_on,
+    title_of,
+    transposed_table,
+    with_names_above,
+)
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.layout import (
@@ -27,11 +34,9 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
-from tissuq.experiments.reading.lines_above import number_before, title_of, with_names_above
-from tissuq.experiments.reading.no_measurements import without_statements_beside, without_summary
+from tissuq.experiments.reading.plain_tables import with_plain_numbers, without_statements_beside, without_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
-from tissuq.experiments.reading.written_numbers import with_plain_numbers
 
 __all__ = ["read_table", "read_tables"]
 
@@ -121,17 +126,12 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
         every_sheet = workbook.sheets(path)
         short = {name: list(enumerate(lines, 1)) for name, lines in every_sheet.items() if len(lines) <= SHORT}
         sheets = sheets_with_tables(path, every_sheet, sheet)
-        tables_of_sheets = [
-            _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, SEPARATOR_OF_CELLS, name)
-            for name, lines in sheets.items()
-        ]
-        return tuple(
-            replace(
-                table, other_lines={**table.other_lines, **{name: short[name] for name in short if name != table.sheet}}
-            )
-            for tables in tables_of_sheets
-            for table in tables
-        )
+        tables = list[Table]()
+        for name, lines in sheets.items():
+            beside = {sheet: short[sheet] for sheet in short if sheet != name}
+            of_sheet = _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, SEPARATOR_OF_CELLS, name)
+            tables += [replace(table, other_lines={**table.other_lines, **beside}) for table in of_sheet]
+        return tuple(tables)
     if sheet is not None:
         raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
     lines = read_lines(path)
@@ -223,21 +223,16 @@ def _read_every_line(
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
         return tables
-    short = [table for table in tables if len(table.rows) <= SHORT]
-    return [
-        replace(table, file=f"{file}, table {number}", number=number, other_lines={"": _lines_of(short, table)})
-        for number, table in enumerate(tables, start=1)
-    ]
+    named = []
+    for number, table in enumerate(tables, start=1):
+        short = [neighbour for neighbour in tables if neighbour is not table and len(neighbour.rows) <= SHORT]
+        beside = [line for near in short for line in (*near.head, *zip(near.lines, near.rows, strict=True))]
+        named.append(replace(table, file=f"{file}, table {number}", number=number, other_lines={"": beside}))
+    return named
 
 
 def _without_comments(lines: Lines) -> Lines:
     return [(line, text) for line, text in lines if ("#" not in text and "//" not in text) or not is_comment(text)]
-
-
-def _lines_of(tables: Sequence[Table], but: Table) -> Lines:
-    """Return the lines above and in tables, but for one of them."""
-    remaining = [table for table in tables if table is not but]
-    return [line for table in remaining for line in (*table.head, *zip(table.lines, table.rows, strict=True))]
 
 
 def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
@@ -260,6 +255,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
             "of their own."
         )
     units = [] if layout.units is None else split(texts[layout.units], layout.separator)
+    number = names[0] if names and NUMBER.fullmatch(names[0]) else ""
     table = Table(
         file=file,
         names=padded(names, width),
@@ -269,7 +265,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         lines=[line for line, _ in content[layout.first_row :]],
         head=[(line, text) for line, text in filled if line < first_line],
         sheet=sheet,
-        title=number_before(names) or title_of(texts[: layout.names or 0], separator),
+        title=number or title_of(texts[: layout.names or 0], separator),
     )
     table = without_statements_beside(table)
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -16,14 +16,12 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
-from tissuq.experiments.reading.labels import check_labels, columns_only
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows, row_names
+from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
@@ -90,26 +88,12 @@ def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False)
     """Return all tests in one file or table, and warn of what there is to know of them."""
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
-    noted = _concerned((test.name, text) for test in tests for text in test.reading.notes)
-    for text, names in noted.items():
+    names_of_text = dict[str, list[str]]()
+    for name, text in dict.fromkeys((test.name, text) for test in tests for text in test.reading.notes):
+        names_of_text.setdefault(text, []).append(name)
+    for text, names in names_of_text.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=3)
     return [test.reading.experiment for test in tests]
-
-
-def _concerned(messages: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the names that every text concerns, of pairs of a name and a text, both in the order of the first.
-
-    Examples
-    --------
-    >>> _concerned([("A", "torn"), ("B", "torn"), ("B", "slack")])
-    {'torn': ['A', 'B'], 'slack': ['B']}
-    """
-    names: dict[str, list[str]] = {}
-    for name, text in messages:
-        of_text = names.setdefault(text, [])
-        if name not in of_text:
-            of_text.append(name)
-    return names
 
 
 def _is_read(data: Any) -> bool:
@@ -180,8 +164,7 @@ def find_tests_in_file(
     tables = read_tables(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
     path = tables[0].file if is_data_frame(path) else path
     has_sheets = len({table.sheet for table in tables}) > 1
-    tests = list[TestInFile]()
-    unrecognised, unreadable = list[tuple[Table, InputError]](), list[tuple[Table, InputError]]()
+    tests, refused = list[TestInFile](), list[tuple[Table, InputError, float, str]]()
     for table in tables:
         selection, names = options.copy(), list[str]()
         if has_sheets:
@@ -194,7 +177,7 @@ def find_tests_in_file(
             rows = only_rows(table, columns_only(table, options.get("only")))
             of_table = _side_by_side(rows, path, selection, names)
         except InputError as error:
-            unrecognised.append((table, error))
+            refused.append((table, error, MIN_SHARE_OF_TEST, "no columns of a test are recognised in it."))
             continue
         try:
             tests += [
@@ -203,46 +186,24 @@ def find_tests_in_file(
                 for test in _of_one_table(rows, path, selection, names, columns, is_only_test=not is_one_of_several)
             ]
         except InputError as error:
-            unreadable.append((table, error))
+            refused.append((table, error, 1 / LENGTH_RATIO, "it is short, and cannot be read as a test."))
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
-    for refused, share in ((unrecognised, MIN_SHARE_OF_TEST), (unreadable, 1 / LENGTH_RATIO)):
-        for table, refusal in refused:
-            if len(table.rows) >= share * longest:
-                raise _may_be_test(refusal, tests) if tests else refusal
-    longest = max((len(test.reading.recorded) for test in tests), default=0)
-    of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
-    tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
-    tests = _of_labels(tests, options.get("only"))
+    refused.sort(key=lambda item: -item[2])
+    for table, why, share, _ in refused:
+        if len(table.rows) >= share * longest:
+            raise _may_be_test(why, tests) if tests else why
+    counts = [len(test.reading.recorded) for test in tests]
+    are_few = [count <= SHORT_TABLE and LENGTH_RATIO * count <= max(counts) for count in counts]
+    of_few_rows = [test.name for test, is_short in zip(tests, are_few, strict=True) if is_short]
+    tests = [test for test, is_short in zip(tests, are_few, strict=True) if not is_short]
+    refusals = [other_label(test.reading.table, test.reading.experiment, options.get("only")) for test in tests]
+    if refusals and all(refusals):
+        raise InputError(refusals[0])
+    tests = [test for test, refusal in zip(tests, refusals, strict=True) if not refusal]
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
-    notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in unrecognised]
-    notes += [f"{table.file} is left out: it is short, and cannot be read as a test." for table, _ in unreadable]
+    notes += [f"{table.file} is left out: {what}" for table, _, _, what in refused]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
-
-
-def _of_labels(tests: list[TestInFile], only: Mapping[str, str | int] | None) -> list[TestInFile]:
-    """Return the tests whose direction and condition are those asked for.
-
-    Raises
-    ------
-    InputError
-        When there is none: why the first is not.
-    """
-    refusals, matching = list[InputError](), list[TestInFile]()
-    for test in tests:
-        try:
-            check_labels(test.reading.table, test.reading.experiment, only)
-            matching.append(test)
-        except InputError as refusal:
-            refusals.append(refusal)
-    if refusals and not matching:
-        raise refusals[0]
-    return matching
-
-
-def _are_few(rows: int, longest: int) -> bool:
-    """Tell whether so many rows are no test beside the longest of their file."""
-    return rows <= SHORT_TABLE and LENGTH_RATIO * rows <= longest
 
 
 def _may_be_test(refusal: InputError, tests: Sequence[TestInFile]) -> InputError:
@@ -258,14 +219,11 @@ def _side_by_side(
     """Return the columns of each test beside the others; None for the only test of a table."""
     stated, source = mode_of(path, table, options, names)
     mode = checked_mode(stated, options)
-    stress_type, columns = options.get("stress_type"), options.get("columns")
-    is_shear = mode.controls == (SHEAR,)
-    tests = (
-        columns_named_again(table, columns) if columns else columns_side_by_side(table, stress_type, is_shear=is_shear)
-    )
+    columns = options.get("columns")
+    tests = columns_named_again(table, columns) if columns else columns_side_by_side(table, mode, options)
     if not tests or len(mode.stresses) > 1:
         with about_mode(mode.name, source):
-            choose_columns(table, mode, columns, options.get("strain_type"), stress_type, options.get("axis"))
+            choose_columns(table, mode, options)
         return [None]
     return list(tests)
 

@@ -1,9 +1,11 @@
-"""What laboratories and testing machines call columns and sizes of specimens, in many languages."""
+"""What laboratories and testing machines call columns, sizes of specimens and other quantities, in many languages."""
 
 from __future__ import annotations
 
 import re
 from unicodedata import normalize
+
+from tissuq.experiments.units import measured_in
 
 __all__ = [
     "COUNT_NAMES",
@@ -22,6 +24,7 @@ __all__ = [
     "SPREADS",
     "SPREAD_WORDS",
     "names_of",
+    "other_quantity",
     "without_accents",
 ]
 
@@ -29,6 +32,52 @@ ACCENTS = re.compile(r"(?<=[A-Za-z])[\u0300-\u036f]+")
 """Accents of Latin letters, where these are written apart from them."""
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "ё": "е"})
 """How keyboards without them write umlauts and their like."""
+
+OTHER_QUANTITIES = {
+    "a modulus": r"modul|^[ge]('|\"|′|″|\*)?$|^young",
+    "a stiffness": r"stiff|steif|rigid|raideur|rigidez|rigidezza|жесткост|刚度|剛性",
+    "a hardness": r"hardness|härte|duret|dureza|durezza|твердост|硬度|硬さ",
+    "a strength": r"strength|festigkeit|résistance|resistencia|resistenza|прочност|强度|強度",
+    "a stress or strain at yield": r"yield|streckgrenze|dehngrenze|fließ|текучест|屈服|降伏",
+    "a largest value, and no curve": r"\bpeak\b|\bultimate\b|\bmaximum\b|\bmaximal\b|\bmax\b",
+    "a value at failure, and no curve": r"\b(fracture|failure|rupture|break(ing)?)\b|bruch",
+    "a range or a difference": r"\brange\b|difference|differenz|invariant",
+    "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|theor|berechnet",
+    "a load before the test": r"\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
+    "an amplitude, and no curve": r"amplitud|амплитуд|振幅",
+    "what was asked of the machine, and not measured": r"set ?point|command|demand|sollwert",
+    "a multiple by a power of ten, which belongs into its unit, as in (10^-3 MPa)": r"((?<!\w)x|[×*·]) ?"
+    r"(10( ?\^| ?\*\*| \d|[⁻⁰¹²³⁴-⁹])|1e ?\d)",
+    "an offset": r"\boffset|versatz|смещение нуля",
+    "an error": r"\berror|fehler|residuals?$",
+    "a logarithm": r"\b(log|lg|ln)(10)?\b(?! strain)|logarithm of",
+    "of bending": r"flex(ur|ion)|bend|bieg|изгиб|弯曲|曲げ",
+    "of peeling": r"peel|schäl|pelage|отслаив|剥离|剥離",
+    "of pulling out": r"pull ?out|auszieh",
+    "of friction": r"friction|reib(ung|kraft)|frottement|трени|摩擦",
+    "of indentation": r"indent|penetration|puncture|needle|eindring|вдавл|индент|压痕|圧痕",
+    "an equivalent (von Mises) value": r"mises|equivalent|vergleichs|эквивалентн|等效|相当",
+    "along another direction than the load": r"transvers|\blateral|\bradial|quer(dehnung|kontraktion|richtung)|"
+    r"(diameter|width|thickness) (change|reduction|strain)|poisson|"
+    r"попереч|横向",
+    "a change of volume": r"volum|объ[её]мн|体积|体積",
+    "a change of area": r"area (reduction|change|ratio|strain)|reduction (of|in) area|einschnürung|necking",
+    "what remains after a test": r"residual|remaining|permanent|plastic|bleibend|restdehnung|остаточн|残余|残留",
+    "what was lost": r"relaxation|recovery|\bdrop\b|\bloss\b",
+    "of a crack": r"\bcrack|\briss|fissure|трещин|裂纹|亀裂",
+    "a damage": r"damage|schädigung|поврежд|损伤",
+    "a porosity": r"poros|пористост|孔隙|空隙",
+    "a swelling": r"swell|quell|набухан|溶胀|膨潤",
+    "a humidity": r"humid|\brh\b|\br ?h$|feucht|humedad|umidità|влажност|湿度",
+    "a concentration": r"concentration|\bdensity|fraction|konzentration|content|gehalt|концентрац|含量|浓度",
+    "a progress": r"progress|fortschritt|completed?$|прогресс|进度|進捗",
+    "a dissipation": r"dissipat|hysteresis|damping|dämpfung",
+}
+"""What names with such words, in small letters, are of, in words that follow *is*."""
+PATTERNS = {what: re.compile(words) for what, words in OTHER_QUANTITIES.items()}
+SYMBOL = r"d ?([^\W\d_]{1,2}|stress|strain|stretch|force|load|sigma|epsilon|lambda|disp(lacement)?)"
+DERIVATIVE = re.compile(rf"\b{SYMBOL} ?/ ?{SYMBOL}\b|derivative|ableitung|\bslope|gradient|steigung|производн")
+"""One quantity by another."""
 
 
 def without_accents(text: str) -> str:
@@ -140,14 +189,21 @@ ROLES = {
 }
 """Names of columns by their role, as :func:`plain` writes them, without the words for a measure of strain or stress."""
 
+
 ROLES_OF_TUBE = ("outer_diameter", "inner_diameter", "pressure")
+
+
 NOUNS = {
     "strain": names_of("axial strain, longitudinal strain, e, λ, lambda"),
     "stress": names_of("axial stress, longitudinal stress, s, sigma, σ"),
 }
 """Further names of strain and stress that are known as such beside a word for a measure of them."""
+
+
 SPREADS = {"sem": "standard error", "sd": "standard deviation"}
 """What columns beside a mean may hold, by their roles."""
+
+
 SPREAD_WORDS = {
     "sem": r"sem|s\.e\.m\.?|se|std\.? ?err(or)?|stderr|standard error|standardfehler|erreur type|error est[áa]ndar|"
     r"errore standard|erro padr[ãa]o|标准误差?|標準誤差?|"
@@ -158,25 +214,38 @@ SPREAD_WORDS = {
     "open": r"±|\+/|^\+$|error|err|fehler|uncertainty",
 }
 """Words for them, and those that leave open which it is."""
+
+
 OPEN_WITHOUT_UNIT = names_of("elongation, relative elongation, относительное удлинение")
 """Names of strains or displacements, as their unit says."""
+
+
 DEFORMATION_NOUNS = names_of("déformation, deformación, deformação, deformazione, деформация")
 """Names of strains that are displacements where their unit is a length."""
+
+
 MEAN_WORDS = (
     r"mean|average|avg\.?|averaged|mittelwert|mittlere[rs]?|moyenne?|media|medio|promedio|m[ée]dia|平均|"
     r"средн(ее|яя|ий)"
 )
+
+
 COUNT_NAMES = re.compile(
     r"n|count|sample size|(number|no\.?|#) of (specimens|samples|tests)|specimens|samples|anzahl( proben)?|"
     r"число образцов|количество образцов|试样数"
 )
 """Names of a column that tells of how many specimens a mean is."""
+
+
 CYCLE_NAMES = names_of(
     "cycle, cycles, cycle count, cycle number, total cycles, total cycle count, "
     "zyklus, zyklen, цикл, циклы, номер цикла, 循环, 循环次数, 周期, サイクル"
 )
+
+
 SET_NAMES = names_of("setname, set name, set")
 """Names of the column in which parts of a test are named."""
+
 
 SPECIMEN_NAME = re.compile(
     r"(specimen|sample|probe|proben?körper|replicate|replikat|donor|subject|patient|animal|tier|éprouvette|échantillon|"
@@ -185,6 +254,7 @@ SPECIMEN_NAME = re.compile(
     r"номер (образца|пробы)|№ образца"
 )
 """Names of a column that tells which specimen a row is of."""
+
 
 DIMENSION_NAMES = {
     "area": names_of(
@@ -223,8 +293,12 @@ DIMENSION_NAMES = {
     ),
 }
 """What the sizes of specimens are called, in the words of testing standards, without those in `OF_SPECIMEN`."""
+
+
 HEIGHT_NAMES = names_of("height, h0, höhe, probenhöhe, hauteur, altura, altezza, hoogte, 高度, 高さ, высота")
 """What the length of a cylinder or a disc is called; of other specimens it may be the thickness."""
+
+
 OF_SPECIMEN = re.compile(
     r"\b((de|del|della|di|du|da|do|van) )*(la |het |l'|d')?(specimen|sample|test piece|disc|disk|eprouvette|"
     r"echantillon|probeta|muestra|provino|campione|corpo de prova|amostra|proefstuk|monster)('s)?\b|"
@@ -234,3 +308,27 @@ OF_SPECIMEN = re.compile(
     r"\b(перво)?начальн(ая|ый|ое)\b|\bисходн(ая|ый|ое)\b|\b(образца|пробы)\b"
 )
 """Words beside the name of a size that leave it what it is, without accents; a mean diameter is that of a tube."""
+
+
+def other_quantity(quantity: str, unit: str) -> str:
+    """Return what a column is that is neither load nor deformation, by its name; an empty text where it may be one.
+
+    Parameters
+    ----------
+    quantity : str
+        As `tissuq.experiments.reading.headings.heading` writes it.
+    unit : str
+        Symbols of moduli are so in units of stress alone.
+
+    Examples
+    --------
+    >>> other_quantity("hardness", "kPa"), other_quantity("rh", "%"), other_quantity("dstress/dstretch", "kPa")
+    ('a hardness', 'a humidity', 'a derivative')
+    >>> other_quantity("e", "kPa"), other_quantity("e", "%"), other_quantity("elongation", "%")
+    ('a modulus', '', '')
+    """
+    if DERIVATIVE.search(quantity):
+        return "a derivative"
+    is_stress = measured_in(unit) == "stress"
+    kinds = (what for what, words in PATTERNS.items() if (is_stress or what != "a modulus") and words.search(quantity))
+    return next(kinds, "")

@@ -1,4 +1,4 @@
-"""Covariates of specimens: a table of its own with a row for each, or columns of a table of measurements."""
+"""Which specimen measurements are of, in several files or in a column of one, and the covariates of specimens."""
 
 from __future__ import annotations
 
@@ -9,18 +9,90 @@ from functools import cached_property
 from pathlib import Path
 from typing import Unpack
 
+import numpy as np
+
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import find_column
-from tissuq.experiments.reading.experiment_file import table_of
+from tissuq.experiments.reading.experiment_file import Reading, read_rows, table_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format
 from tissuq.experiments.reading.layout import WHITESPACE, is_comment, split
 from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.reading.several_files import SUFFIXES
-from tissuq.experiments.reading.several_specimens import only_rows, row_names
+from tissuq.experiments.reading.rows_of_tests import only_rows, row_names
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.text_file import read_lines
 
-__all__ = ["CovariateTable", "covariate_columns", "read_covariates"]
+__all__ = ["SUFFIXES", "CovariateTable", "covariate_columns", "find_tests", "read_column", "read_covariates"]
+
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet")
+"""Of files in a folder that may hold measurements."""
+
+
+def find_tests(
+    paths: Sequence[str | os.PathLike[str]], but: str | os.PathLike[str] | None = None
+) -> dict[str, list[Path]]:
+    """Return the files of every specimen, but for a file that is none.
+
+    A file is a specimen of its name. In a folder, every file is, and every folder is one specimen with a file for each
+    test.
+
+    Raises
+    ------
+    InputError
+        When there is no file in a folder, or two specimens have one name.
+    """
+    specimens: dict[str, list[Path]] = {}
+    left_out = None if but is None else Path(but).resolve()
+    for path in map(Path, paths):
+        for source, files in (_in_folder(path) if path.is_dir() else {path: [path]}).items():
+            if source.resolve() == left_out:
+                continue
+            name = source.name if source.is_dir() else source.stem
+            if name in specimens:
+                raise InputError(
+                    f"'{specimens[name][0]}' and '{files[0]}' are both named '{name}': rename one, or put the tests "
+                    "of one specimen into a folder of its own within the folder of all."
+                )
+            specimens[name] = files
+    return specimens
+
+
+def read_column(
+    path: str | os.PathLike[str], specimen: str | int, **options: Unpack[ReadingOptions]
+) -> dict[str, Reading]:
+    """Return what is read of each specimen that a column of one file names, in the order of the file.
+
+    Parameters
+    ----------
+    path : str or path
+    specimen : str or int
+        Name, or number from 1, of the column.
+    options
+        As for `tissuq.read_experiment`.
+    """
+    table = only_rows(table_of(path, options), options.get("only"))
+    column = find_column(table, "specimen", specimen)
+    labels = np.array(row_names(table, column))
+    if (labels == "").any():
+        row = int(np.argmax(labels == ""))
+        raise InputError(f"{table.place(column, row)}: the name of the specimen is missing.")
+    readings = {}
+    for label in dict.fromkeys(labels.tolist()):
+        named_options: ReadingOptions = {**options, "name": label}
+        readings[label] = read_rows(table.taken(np.flatnonzero(labels == label)), path, **named_options)
+    return readings
+
+
+def _in_folder(folder: Path) -> dict[Path, list[Path]]:
+    """Return the files of every specimen in a folder, by the file or the folder that names it."""
+    folders = {child: _tables(child) for child in folder.iterdir() if child.is_dir()}
+    sources = {child: files for child, files in folders.items() if files} | {file: [file] for file in _tables(folder)}
+    if not sources:
+        raise InputError(f"folder '{folder}' holds no files that end in {', '.join(SUFFIXES)}.")
+    return dict(sorted(sources.items()))
+
+
+def _tables(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
 
 
 @dataclass(frozen=True, eq=False)

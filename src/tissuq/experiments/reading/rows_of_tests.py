@@ -1,4 +1,4 @@
-"""Columns that part the rows of one table into tests of several specimens, and the rows of one of them."""
+"""Which test the rows of a table are of: its specimen, direction and condition, by columns and by names."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from itertools import pairwise
 import numpy as np
 
 from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.columns import find_column
-from tissuq.experiments.reading.headings import dimensions_named, is_of_specimens, plain
+from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, is_of_specimens, plain
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stated_mode import modes_in_column
 from tissuq.experiments.reading.table import Column, Table, filled_on
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 
 __all__ = [
+    "LABELS",
     "SeveralSpecimens",
     "advice_on_numbered_tests",
     "check_one_specimen",
+    "columns_only",
     "jump",
+    "labels_of",
     "only_rows",
+    "other_label",
     "row_names",
     "specimen_of",
 ]
@@ -39,6 +44,24 @@ SPECIMENS_OF_POPULATION = 3
 """Fewest specimens that show a population."""
 SHOWN = 6
 """Number of values that a message lists."""
+
+LABELS = {
+    "direction": (
+        r"(loading |test(ing)? |fib(re|er) |specimen |sample |material )?(direction|orientation)|"
+        r"(faser|last|zug)?richtung|orientierung|direction (de|du) .*|direcci[óo]n|direzione|direção|направление|方向",
+        r"longitudinal\w*|transvers\w*|circumferential\w*|circ|hoop|axial\w*|radial\w*|"
+        r"(along|across|cross|parallel|perpendicular)[ -]?(to )?(the )?fib(re|er)s?|fib(re|er)[ -]?direction|"
+        r"längs\w*|quer\w*|umfangs\w*|продольн\w*|поперечн\w*|окружн\w*|(0|45|90)[ -]?(deg|degrees|°)",
+    ),
+    "condition": (
+        r"(test(ing)? |specimen |sample )?(condition|treatment|state|group)|medium|bedingung|behandlung|zustand|gruppe|"
+        r"condition|traitement|groupe|condici[óo]n|tratamiento|grupo|condizione|trattamento|состояние|условие|обработка|"
+        r"группа|条件|处理|組|组",
+        r"fresh|frozen|thawed|fixed|dried|dry|wet|hydrated|dehydrated|control|treated|untreated|healthy|diseased|"
+        r"decellulari[sz]ed|native|cross-?linked|frisch|gefroren|aufgetaut|fixiert|trocken|feucht|kontrolle|behandelt",
+    ),
+}
+"""Names of columns of each label, and words that say it in the name of a test, its sheet or its file."""
 
 
 class SeveralSpecimens(InputError):
@@ -126,8 +149,8 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 def specimen_of(table: Table) -> str:
     """Return the specimen that columns name, of which all rows are; an empty text where they name none, or several."""
     columns = [column for column in range(len(table.names)) if is_of_specimens(table.quantities[column])]
-    labels = [set(row_names(table, column)) for column in columns]
-    return " ".join(names.pop() for names in labels) if all(len(names) == 1 for names in labels) else ""
+    labels = [_text_of_all_rows(table, column) for column in columns]
+    return " ".join(labels) if all(labels) else ""
 
 
 def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], course: Column) -> str:
@@ -181,3 +204,60 @@ def _listed(texts: Sequence[str]) -> str:
     values = [f"'{text}'" for text in dict.fromkeys(texts)]
     more = f" and {len(values) - SHOWN} more" if len(values) > SHOWN else ""
     return ", ".join(values[:SHOWN]) + more
+
+
+def labels_of(table: Table, names: Sequence[str]) -> dict[str, str]:
+    """Return direction and condition of the test in a table, as far as one of them is said; empty texts otherwise.
+
+    Parameters
+    ----------
+    table : Table
+        Its columns with one text in all rows go before words in names.
+    names : sequence of str
+        Of the test, from its file to the test itself; the last that says a label tells it.
+
+    Examples
+    --------
+    >>> from tissuq.experiments.reading.table import Table
+    >>> table = Table("a.csv", ("stretch", "Treatment"), ("", ""), ",", ["1,frozen", "1.1,frozen"], [2, 3])
+    >>> labels_of(table, ["aorta circumferential", "sheet 1"])
+    {'direction': 'circumferential', 'condition': 'frozen'}
+    """
+    labels = dict[str, str]()
+    for label, (pattern, words) in LABELS.items():
+        columns = [column for column, name in enumerate(table.quantities) if re.fullmatch(pattern, name)]
+        stated = _text_of_all_rows(table, columns[0]) if len(columns) == 1 else ""
+        labels[label] = stated or _in_names(names, words)
+    return labels
+
+
+def columns_only(table: Table, only: Mapping[str, str | int] | None) -> dict[str, str | int]:
+    """Return what of ``only`` is asked of cells of columns; directions and conditions may be said elsewhere."""
+    stated = LABELS.keys() - {*table.quantities}
+    return {name: value for name, value in (only or {}).items() if name.lower() not in stated}
+
+
+def other_label(table: Table, experiment: Experiment, only: Mapping[str, str | int] | None) -> str:
+    """Return that the direction or condition of a test is not what is asked for; an empty text where it is."""
+    for name in set(only or {}) - columns_only(table, only).keys():
+        wanted, stated_label = str((only or {})[name]), getattr(experiment, name.lower())
+        if stated_label.lower() != wanted.strip().lower():
+            is_what = f"is '{stated_label}'" if stated_label else "is not said by a column or a name"
+            return f"{table.file}: the {name.lower()} of the test {is_what}, not '{wanted}'. Leave it out."
+    return ""
+
+
+def _text_of_all_rows(table: Table, column: int) -> str:
+    """Return the text in all rows of a column; an empty text where there are several."""
+    cells = set(row_names(table, column))
+    return cells.pop() if len(cells) == 1 else ""
+
+
+def _in_names(names: Sequence[str], pattern: str) -> str:
+    """Return the word in the last name that says a label; nothing where one says two."""
+    for name in reversed(names):
+        words = re.sub(r"[\s_-]+", " ", NEXT_WORD.sub(" ", name)).lower()
+        labels = {match[0] for match in re.finditer(rf"(?<!\w)(?:{pattern})(?!\w)", words)}
+        if labels:
+            return labels.pop() if len(labels) == 1 else ""
+    return ""
