@@ -11,11 +11,18 @@ import numpy as np
 
 from tissuq.assessment.extent import has_energy, shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE
-from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.errors import TissuqError
+from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
 from tissuq.population.warnings import far_specimens
-from tissuq.report.population_figures import Bands, headline, headline_figure, patient_figure, specimens_figure
+from tissuq.report.population_figures import (
+    Bands,
+    Measured,
+    headline,
+    headline_figure,
+    patient_figure,
+    specimens_figure,
+)
 from tissuq.report.population_tables import (
     copy_of_covariates,
     effects_of_covariates,
@@ -193,9 +200,7 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
     )
 
 
-def _sections(
-    study: PopulationStudy, bands: Mapping[LoadingMode, Bands], not_predicted: list[str]
-) -> tuple[Section, ...]:
+def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predicted: list[str]) -> tuple[Section, ...]:
     """Return what a page folds: every parameter, new specimens, specimens, how to read it, how it was computed."""
     population, diagnostics, settings = study.population, study.population.diagnostics, study.settings
     is_one = len(population.symbols) == 1
@@ -211,7 +216,7 @@ def _sections(
         patient.append(
             Picture(
                 "new_patient", lambda: patient_figure(population, bands, study.unit),
-                "Predicted stress of a new specimen", PATIENT_CAPTION, len(study.modes) == 1,
+                "Predicted stress of a new specimen", PATIENT_CAPTION, len(bands) == 1,
             )
         )  # fmt: skip
     if patient:
@@ -251,44 +256,52 @@ def _tolerances(population: Population) -> Tolerances:
 
 
 def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
-    """Return the measurements, with their loading mode where there are several."""
+    """Return the measurements, with their loading mode and the stress where there are several."""
     rows: list[Row] = []
+    has_stresses = any(len(mode.stresses) > 1 for mode in study.modes)
     for name, tests in study.tests.items():
-        for test in tests:
-            labels: Row = {"specimen": name} | ({"mode": test.mode.name} if several else {})
-            pairs = zip(test.stretch, test.stress, strict=True)
-            rows += [labels | {"stretch": float(stretch), "stress": float(stress)} for stretch, stress in pairs]
+        for curve in (curve for test in tests for curve in test.curves):
+            labels: Row = {"specimen": name} | ({"mode": curve.mode.name} if several else {})
+            labels |= {"measured": curve.quantity} if has_stresses else {}
+            pairs = zip(curve.abscissa.tolist(), curve.stress.tolist(), strict=True)
+            rows += [labels | {"stretch": stretch, "stress": stress} for stretch, stress in pairs]
     return rows
 
 
-def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]:
-    """Return the stress of a new specimen in every mode, with the model error and without; and why in some not."""
-    bands, not_predicted = {}, []
+def _bands(study: PopulationStudy) -> tuple[dict[Measured, Bands], list[str]]:
+    """Return every measured stress of a new specimen, with the model error and without; and why some are not there."""
+    bands, not_predicted = dict[Measured, Bands](), []
     for mode in study.modes:
         ranges = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
         reach = np.concatenate(ranges)
         stretch = np.linspace(reach.min(), reach.max(), POINTS)
         try:
-            band, material_alone = (
-                study.population.new_patient(stretch, mode=mode, discrepancy=with_discrepancy, unit="MPa")
-                for with_discrepancy in (True, False)
-            )
-        except ModelError as error:  # some of the population's materials lock before the largest stretch
+            check_one_control(mode)
+            for channel in range(len(mode.stresses)):
+                options: dict[str, Any] = {"mode": mode, "channel": channel, "unit": "MPa"}
+                band, material_alone = (
+                    study.population.new_patient(stretch, discrepancy=with_discrepancy, **options)
+                    for with_discrepancy in (True, False)
+                )
+                bands[mode, channel] = (band, material_alone)
+        except TissuqError as error:  # two controls, or some of the population's materials lock before the largest
             not_predicted.append(f"{mode.name}: {error}")
-        else:
-            bands[mode] = (band, material_alone)
     return bands, not_predicted
 
 
-def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFrame:
-    """Return the stresses of new specimens, indexed by stretch, and by mode where there are several."""
+def _band_table(bands: Mapping[Measured, Bands], several: bool) -> pd.DataFrame:
+    """Return the stresses of new specimens by stretch, and by mode and stress where there are several."""
     import pandas as pd
 
+    has_stresses = any(len(mode.stresses) > 1 for mode, _ in bands)
     tables = {
-        mode.name: band.merge(material_alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
-        for mode, (band, material_alone) in bands.items()
+        (mode.name,) * several + (mode.stresses[channel],) * has_stresses: band.merge(
+            material_alone, on="stretch", suffixes=("", "_material_alone")
+        ).set_index("stretch")
+        for (mode, channel), (band, material_alone) in bands.items()
     }
-    return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
+    names = ["mode"] * several + ["measured"] * has_stresses
+    return pd.concat(tables, names=names) if names else next(iter(tables.values()))
 
 
 def _copies(study: PopulationStudy, beside: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
