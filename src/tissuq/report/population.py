@@ -103,6 +103,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     sources, names = _copies(study, beside)
     of_covariates, relocated = copy_of_covariates(study, beside)
     law, laws = law_files(settings.material)
+    share = _share_of_discrepancy(population, study.warnings)
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
@@ -122,8 +123,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         title=f"{settings.material} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
-        finding=_lead(study),
-        next_step=_next_step(population, study.warnings, settings.without),
+        finding=_lead(study) + _about_law(population, share),
+        next_step=_next_step(population, study.warnings, share, settings.without),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
@@ -140,8 +141,13 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     )  # fmt: skip
 
 
-def _next_step(population: Population, warnings: Sequence[str], already_without: Sequence[str] = ()) -> str:
-    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
+def _next_step(
+    population: Population, warnings: Sequence[str], share: float = 0.0, already_without: Sequence[str] = ()
+) -> str:
+    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
+
+    ``share`` is that of the stress which the discrepancy carries.
+    """
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
     if has_code(warnings, "doubtful-reading"):
@@ -157,6 +163,11 @@ def _next_step(population: Population, warnings: Sequence[str], already_without:
         return (
             "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
             "compute with a new one"
+        )
+    if share > PRECISE:
+        return (
+            "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
+            "out; tissuq fit FILE --material all of one specimen says which"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
@@ -386,22 +397,28 @@ def _lead(study: PopulationStudy) -> str:
         f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
         f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
-    ) + _about_law(study.population, study.warnings)
+    )
 
 
-def _about_law(population: Population, warnings: Sequence[str]) -> str:
-    """Return how far the law alone is from the measurements, as a sentence after others.
-
-    Nothing where it is near, where there is stress at rest, or where that is not known of most specimens.
-    """
-    solutions = [fit.solution for fit in population.posteriors.values() if has_energy(fit.solution.model)]
-    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
-    known = [share for share, _, high in shares if high < 1]
-    is_clear = 2 * len(known) > len(population.posteriors) and not has_code(warnings, "stress-at-rest")
-    if not is_clear or (share := float(np.median(known))) <= PRECISE:
+def _about_law(population: Population, share: float) -> str:
+    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
+    if share <= PRECISE:
         return ""
     law = population.complete.model.material.name
     return (
-        f" {law} alone is wrong here: the discrepancy carries {share:.0%} of the stress "
-        "(median of the specimens). Use it with the discrepancy, as exported cards do, or fit another law."
+        f" {law} alone is wrong here: the discrepancy carries {share:.0%} of the stress (median of the specimens), and "
+        f"cards of a new specimen are of {law} alone."
     )
+
+
+def _share_of_discrepancy(population: Population, warnings: Sequence[str]) -> float:
+    """Return the share of the stress that the discrepancy carries: the median of the specimens.
+
+    Zero where there is stress at rest, or where it is not known of most specimens.
+    """
+    posteriors = population.posteriors
+    solutions = [fit.solution for fit in posteriors.values() if has_energy(fit.solution.model)]
+    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
+    known = [share for share, _, high in shares if high < 1]
+    is_clear = 2 * len(known) > len(posteriors) and not has_code(warnings, "stress-at-rest")
+    return float(np.median(known)) if is_clear else 0.0
