@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -308,7 +309,10 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     text = " ".join(said.out.split())
     assert "new specimen (age 80 year)" in text
     assert "beyond the specimens: age 80 year (theirs: 30 to 70)" in text
-    assert f"{float(row['median']):.4g} per year" in text
+    effect, low, high = map(float, re.search(r"× ([\d.]+) per year \[([\d.]+), ([\d.]+)\]", text).groups())
+    width = float(row["hdi_high"]) - float(row["hdi_low"])
+    for shown, name in ((effect, "median"), (low, "hdi_low"), (high, "hdi_high")):
+        assert shown == pytest.approx(float(row[name]), abs=0.02 * width)  # as exact as the interval is wide
     needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
     assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
     assert needed["new patient"]["specimens"] == ""
