@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -315,7 +316,10 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     text = " ".join(said.out.split())
     assert "new specimen (age 80 year)" in text
     assert "beyond the specimens: age 80 year (theirs: 30 to 70)" in text
-    assert f"{float(row['median']):.4g} per year" in text
+    effect, low, high = map(float, re.search(r"× ([\d.]+) per year \[([\d.]+), ([\d.]+)\]", text).groups())
+    width = float(row["hdi_high"]) - float(row["hdi_low"])
+    for shown, name in ((effect, "median"), (low, "hdi_low"), (high, "hdi_high")):
+        assert shown == pytest.approx(float(row[name]), abs=0.02 * width)  # as exact as the interval is wide
     needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
     assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
     assert needed["new patient"]["specimens"] == ""
@@ -417,3 +421,38 @@ def test_bad_input_ends_with_one_message(cli, here, arguments, words):
     assert words in said.err
     assert "Traceback" not in said.err
     assert not (here / "runs").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["biaxial", "simple-shear-normal"])
+def test_specimens_with_two_stresses_in_several_tests_of_one_table_are_a_population(cli, here, mode):
+    noise, rows = np.random.default_rng(3), []
+    for k, modulus in enumerate(MODULI_KPA):
+        for test, (x, y) in {"first": (0.3, 0.3), "second": (0.3, 0.0)}.items():
+            for part in np.linspace(0, 1, 9):
+                if mode == "biaxial":
+                    a, b = 1 + part * x, 1 + part * y
+                    stresses = np.array([a - a**-3 * b**-2, b - b**-3 * a**-2])
+                    points = f"{a:.6f},{b:.6f}"
+                else:
+                    shear = part * (x + y)
+                    stresses, points = np.array([shear, -(shear**2)]), f"{shear:.6f}"
+                first, second = 2 * modulus * stresses + 0.5 * noise.standard_normal(2)
+                rows.append(f"S{k},{test},{points},{first:.4f},{second:.4f}")
+    controls = "stretch x,stretch y" if mode == "biaxial" else "shear"
+    stresses = "stress x [kPa],stress y [kPa]" if mode == "biaxial" else "shear stress [kPa],normal stress [kPa]"
+    (here / "all.csv").write_text("\n".join([f"specimen,protocol,{controls},{stresses}", *rows]) + "\n")
+    options = ["--specimen-column", "specimen", "--mode", mode, "--discrepancy", "none", "--noise-sd", 0.5]
+    if mode != "biaxial":
+        options += ["--column", "stress=shear stress [kPa]", "--column", "stress2=normal stress [kPa]"]
+    said = cli("population", "all.csv", *options, "--out", "run", "--no-figures")
+    assert said.status == 0, said.err
+    found = {row["specimen"]: float(row["median"]) for row in table(here / "run" / "specimens.csv")}
+    for k, modulus in enumerate(MODULI_KPA):
+        assert found[f"S{k}"] == pytest.approx(modulus, rel=0.02)  # sd of a C10: 0.5 kPa over the norm of 36 stresses
+    measured = [row["measured"] for row in table(here / "run" / "data.csv")]
+    assert len(set(measured)) == 2
+    assert len(measured) == 2 * len(rows)
+    page = (here / "run" / "report.html").read_text()
+    assert ("Not predicted: biaxial" in page) == (mode == "biaxial")
+    assert (here / "run" / "new_patient.csv").exists() == (mode != "biaxial")

@@ -68,6 +68,15 @@ def test_what_is_no_function_is_told_before_any_run(tmp_path, monkeypatch, place
         FileForward(name).check(["C10"])
 
 
+@pytest.mark.parametrize(
+    ("model", "names"), [(lambda depth, E: E * depth, "depth, E"), (lambda depth, E, m: E * depth**m, "depth, E, m")]
+)
+def test_a_function_of_single_parameters_is_told_before_any_run(model, names):
+    priors = {"E": tq.Uniform(0.1, 1), "m": tq.Uniform(1, 2)}
+    with pytest.raises(InputError, match=rf"takes {names}, each by itself. Write .* of a dictionary of parameters"):
+        tq.calibrate(np.linspace(0.1, 1, 5), np.linspace(0.1, 1, 5), model, priors)
+
+
 def test_a_function_of_a_module_is_found():
     assert FileForward("builtins:len").run({"C10": 1.0}, DEPTH) == 1
 

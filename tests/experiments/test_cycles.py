@@ -29,6 +29,24 @@ def test_turning_points_part_cycles(written):
     assert found(written(stretch)) == [(0, 20, 40), (40, 60, 80), (80, 100, 121)]
 
 
+def test_the_way_back_to_rest_from_the_other_side_ends_the_last_cycle_and_is_none(written):
+    there, back = np.linspace(1, 1.2, 21), np.linspace(1.2, 0.8, 41)[1:]
+    once_more = np.concatenate([back[::-1][1:], [1.2], back])
+    stretch = np.concatenate([there, back, once_more, np.linspace(0.8, 1, 21)[1:]])
+    assert found(written(stretch)) == [(0, 20, 60), (60, 100, 161)]
+    last = read_file(written(stretch), cycle="last")
+    assert (last.experiment.stretch.min(), last.experiment.stretch.max()) == pytest.approx((0.8, 1.2))
+    assert len(last.used_cycles) == 1
+    assert len(found(written(np.concatenate([there, back, np.linspace(0.8, 1, 21)[1:]])))) == 1
+
+
+def test_a_last_way_that_starts_at_rest_is_a_cycle_whether_it_reaches_the_peak_or_not(written):
+    cycle = np.concatenate([np.linspace(1, 1.3, 31), np.linspace(1.3, 1, 31)[1:-1]])
+    for end in (1.3, 1.15):
+        ramp = np.linspace(1, end, 21)
+        assert found(written(np.concatenate([cycle, ramp]))) == [(0, 30, 60), (60, 80, 81)]
+
+
 def test_noise_and_holds_make_no_cycles(written):
     random = np.random.default_rng(3)
     stretch = np.concatenate([np.linspace(1, 1.3, 200), np.full(50, 1.3), np.linspace(1.3, 1.0, 200)])
@@ -43,7 +61,7 @@ def test_a_ramp_is_one_cycle_that_ends_at_its_turning_point(written):
 
 
 def test_one_row_is_one_cycle():
-    assert [(c.start, c.peak, c.stop) for c in find_cycles(_table(), np.array([1.1]))] == [(0, 0, 1)]
+    assert [(c.start, c.peak, c.stop) for c in find_cycles(_table(), np.array([1.1]), 1.0)] == [(0, 0, 1)]
 
 
 def _table():

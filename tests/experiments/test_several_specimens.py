@@ -173,3 +173,40 @@ def test_rows_of_several_loading_modes_are_a_test_each(tmp_path, interleaved):
     assert [test.mode.name for test in tests] == modes
     for test, factor in zip(tests, STIFFNESS.values(), strict=True):
         np.testing.assert_allclose(test.stress, factor * neo_hookean(test.stretch), atol=1e-6)
+
+
+def test_directions_of_different_reach_on_both_sides_of_rest_are_tests_of_their_own(tmp_path):
+    reaches = {"FS": 0.34, "SF": 0.30, "NF": 0.41}  # they begin 14 % of the range of all apart
+    lines = [f"{name},{x:.6f},{x:.6f}" for name, end in reaches.items() for x in np.linspace(-end, end, 40)]
+    path = tmp_path / "shear.csv"
+    path.write_text("direction,shear,stress [kPa]\n" + "\n".join(lines) + "\n")
+    tests = tq.read_tests(path, mode="simple-shear")
+    assert {test.direction: test.stretch.max() for test in tests} == pytest.approx(reaches)
+
+
+def test_cycles_whose_way_back_was_measured_stay_one_test_where_they_begin_apart(tmp_path):
+    there = np.linspace(-0.3, 0.3, 20)
+    lines = [
+        f"{name},{begin + x:.6f},{begin + x:.6f}"
+        for name, begin in (("first", 0.0), ("second", -0.1))
+        for x in [*there, *there[::-1]]
+    ]
+    path = tmp_path / "shear.csv"
+    path.write_text("part,shear,stress [kPa]\n" + "\n".join(lines) + "\n")
+    assert len(tq.read_tests(path, mode="simple-shear")) == 1
+
+
+def test_protocols_of_a_sheet_that_hold_either_axis_are_tests_of_their_own(tmp_path):
+    rise = np.linspace(0, 0.25, 20)
+    ends = {"off": (0.6, 0.5), "equi": (0.6, 1.0), "strip-x": (0.6, 0.0), "strip-y": (0.0, 1.0)}
+    lines = [
+        f"{name},{1 + along * x:.6f},{(along + across / 2) * x:.6f},{1 + across * x:.6f},{(across + along / 2) * x:.6f}"
+        for name, (along, across) in ends.items()
+        for x in rise
+    ]
+    path = tmp_path / "sheet.csv"
+    path.write_text("protocol,stretch x,stress x [kPa],stretch y,stress y [kPa]\n" + "\n".join(lines) + "\n")
+    tests = tq.read_tests(path)
+    assert [test.name for test in tests] == list(ends)
+    for test, (along, across) in zip(tests, ends.values(), strict=True):
+        np.testing.assert_allclose(test.stretch[-1], [1 + 0.25 * along, 1 + 0.25 * across])

@@ -17,7 +17,7 @@ def write(file, rows=ROWS, head="stretch,stress_kPa"):
 
 
 def experiments_in(file, column):
-    return {name: reading.experiment for name, reading in read_column(file, column).items()}
+    return {name: reading.experiment for name, (reading,) in read_column(file, column).items()}
 
 
 def test_files_are_specimens_and_folders_are_repeated_tests(tmp_path):
@@ -74,8 +74,22 @@ def test_the_options_of_the_reader_hold_for_every_specimen_of_a_file(tmp_path):
     rows = [f"{name},{k * 0.1:.1f},{k * size:.1f}" for name, size in (("a", 1.0), ("b", 2.0)) for k in range(6)]
     file = write(tmp_path / "all.csv", rows, "who,displacement_mm,force_N")
     options = {"dimensions": {"length": "10 mm", "area": "4 mm2"}, "preload": "2 N", "every": 2}
-    found = read_column(file, "who", **options)
+    found = {name: reading for name, (reading,) in read_column(file, "who", **options).items()}
     assert found["a"].experiment.stretch.tolist() == pytest.approx([1, 1 + 0.2 / 10.2])
     assert found["b"].experiment.stress.tolist() == pytest.approx([0.5, 1.5, 2.5])
     assert found["b"].experiment.name == "b"
     assert "the preload" in found["b"].experiment.source
+
+
+def test_a_specimen_of_a_column_may_have_several_tests(tmp_path):
+    modes = {"uniaxial": (1.0, 1.1, 1.2, 1.3, 1.4), "simple-shear": (0.0, 0.1, 0.2, 0.3, 0.4)}
+    rows = [
+        f"{who},{mode},{control},{size * abs(control - controls[0]):.3f}"
+        for who, size in (("a", 1.0), ("b", 2.0))
+        for mode, controls in modes.items()
+        for control in controls
+    ]
+    found = read_column(write(tmp_path / "all.csv", rows, "who,mode,stretch,stress_kPa"), "who")
+    for who, size in (("a", 1.0), ("b", 2.0)):
+        assert [reading.experiment.mode.name for reading in found[who]] == list(modes)
+        assert [reading.experiment.stress[-1] for reading in found[who]] == pytest.approx([4e-4 * size] * 2)

@@ -67,3 +67,10 @@ def test_exponents_of_fortran_are_read(tmp_path, letter):
     data = tq.read(written(tmp_path, ["Stretch", "Stress_2D-10 (kPa)"], *rows), stress=2)
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-8)
     np.testing.assert_allclose(data.stress, STRESS, rtol=1e-7, atol=1e-12)
+
+
+def test_a_column_of_labels_that_are_names_of_quantities_stands_upright(tmp_path):
+    lines = [f"Stretch,{k},{1 + 0.01 * k:.2f},{k},{k}" for k in range(30)]
+    path = tmp_path / "sets.csv"
+    path.write_text("\n".join(["SetName,Time_S,stretch,stress [kPa],temperature", *lines]) + "\n")
+    assert tq.read(path).stretch.tolist() == pytest.approx([1 + 0.01 * k for k in range(30)])

@@ -9,6 +9,7 @@ import tissuq as tq
 from machine_files import C01, C10, biotester_protocols, mooney_rivlin
 from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.findings import data_warnings
 
 STRETCH = np.array([[1.0, 1.0], [1.1, 1.05], [1.2, 1.1], [1.3, 1.15]])
 STRESS = mooney_rivlin(STRETCH)
@@ -249,3 +250,25 @@ def test_an_inspection_says_of_each_axis_what_its_ranges_are(tmp_path):
     assert "stretch axis 1: 1 to 1.35; axis 2: 1 to 1.7" in text
     assert "'stress_2_kPa' is stress of axis 2" in text
     assert "of engineering stress of" not in text
+
+
+SHEAR = np.array([0.0, 0.5, 1.0, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("names", "components", "said"),
+    [
+        ("F11,F22,F12,F21", [0.06 * SHEAR, 0.0 * SHEAR], "column 'F12' says that the sheet was sheared"),
+        ("F11,F22,F12,F21", [0.08 * SHEAR, 0.02 * SHEAR], "columns 'F12' and 'F21' say that the sheet was sheared"),
+        ("F11,F22,F12,F21", [0.08 * SHEAR, -0.07 * SHEAR], ""),  # mostly a rotation
+        ("F11,F22,F12,F21", [0.02 * SHEAR, 0.01 * SHEAR], ""),
+        ("stretch x,stretch y,E12,note", [0.04 * SHEAR, 1 + SHEAR], "column 'E12' says that the sheet was sheared"),
+        ("stretch x,stretch y,E12,note", [0.015 * SHEAR, 1 + SHEAR], ""),
+    ],
+)
+def test_a_sheet_that_was_sheared_too_is_doubted(tmp_path, names, components, said):
+    columns = (*STRETCH.T, *components, *(1e3 * STRESS).T)
+    path = written(tmp_path, f"{names},stress x [kPa],stress y [kPa]", *columns)
+    doubts = [text for text in data_warnings(read_file(path, **BIAXIAL)) if "sheared" in text]
+    assert len(doubts) == bool(said)
+    assert all(text.startswith(said) for text in doubts)

@@ -110,6 +110,12 @@ def test_what_cannot_work_is_refused_in_words(make, words):
         make()
 
 
+def test_a_law_of_ones_own_that_uses_the_names_of_an_amplitude_is_to_be_renamed():
+    law = tq.FunctionLaw(lambda I1, I2, c1, c2: c1 * (I1 - 3) + c2 * (I1 - 3) ** 2)
+    with pytest.raises(tq.ModelError, match=r"adds c1, c2, .* two things\. Rename .* c1 to c1_law"):
+        model("auto", law)
+
+
 def test_fewer_points_than_parameters_are_refused():
     few = tq.Experiment("uniaxial", [0.9, 1.1, 1.2], [-0.3, 0.3, 0.5])
     with pytest.raises(tq.InputError, match="3 measurements for 5 parameters"):

@@ -452,7 +452,8 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     without_unit = ResultWarning("the unit of the stress is not stated.", "doubtful-reading", Severity.PROBLEM)
     assert _next_step(population, [without_unit]).startswith("say what the files do not")
     population.posteriors.pop("soft")
-    assert "finite elements" in _next_step(population, [])
+    assert "finite elements" in _next_step(population, [], share=0.2)
+    assert _next_step(population, [], share=0.3).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
     assert "--aim 20%" in _next_step(population, [], uses=useless)
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
@@ -467,13 +468,15 @@ def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_tha
     def said(shares, warnings=()):
         fits = {name: SimpleNamespace(solution=Share(share)) for name, share in zip("abc", shares, strict=True)}
         law = SimpleNamespace(model=SimpleNamespace(material=SimpleNamespace(name="demiray")))
-        return population._about_law(SimpleNamespace(posteriors=fits, complete=law), warnings)
+        pooled = SimpleNamespace(posteriors=fits, complete=law)
+        return population._about_law(pooled, population._share_of_discrepancy(pooled, warnings))
 
     class Share(tuple):
         model = None
 
     clear = [(0.1, 0.0, 0.2), (0.4, 0.3, 0.5), (0.6, 0.4, 0.8)]
     assert "demiray alone is wrong here: the discrepancy carries 40 % of the stress" in said(clear)
+    assert said(clear).endswith("cards of a new specimen are of demiray alone.")
     assert said(clear, [at_rest]) == ""
     assert said([(0.1, 0.0, 0.2)] * 2 + clear[2:]) == ""
     assert said([(0.9, 0.3, 1.5)] * 2 + clear[2:]) == ""

@@ -72,3 +72,34 @@ def test_a_posterior_survives_pickling(method):
     before = tq.fit(DATA, discrepancy="constant", noise_sd=0.2, method=method)
     table = before.summary()
     assert pickle.loads(pickle.dumps(before)).summary().equals(table)
+
+
+@pytest.mark.parametrize(
+    ("law", "directions", "is_told"),
+    [
+        ("neo-hookean+standard-fibres:one@0", ("circumferential", "axial"), True),
+        ("neo-hookean+standard-fibres:one@0", ("axial", "axial"), False),
+        ("neo-hookean+standard-fibres:one@0", ("", "axial"), False),
+        ("neo-hookean", ("circumferential", "axial"), False),
+    ],
+)
+def test_fibres_beside_strips_of_several_directions_are_a_problem(law, directions, is_told):
+    stretch = np.linspace(1.02, 1.4, 12)
+    strips = [
+        tq.Experiment("uniaxial", stretch, factor * (stretch - stretch**-2), direction=direction)
+        for factor, direction in zip((1.0, 2.0), directions, strict=True)
+    ]
+    warnings = tq.fit(strips, material=law, discrepancy="none", noise_sd=0.05).warnings
+    told = [warning for warning in warnings if "several directions of the tissue (" in warning]
+    assert [(warning.code, warning.severity.name) for warning in told] == [("contradicting-tests", "PROBLEM")] * is_told
+
+
+def test_sheets_of_which_both_axes_were_measured_may_have_names_of_protocols_beside_fibres():
+    stretch = np.array([[1 + x, 1 + share * x] for share in (0.5, 1.0) for x in np.linspace(0.02, 0.3, 8)])
+    stress = 0.1 * (stretch - 1 / (stretch * stretch.prod(axis=1, keepdims=True) ** 2))
+    sheets = [
+        tq.Experiment("biaxial", stretch[rows], stress[rows], direction=name)
+        for name, rows in {"off-x": slice(8), "equi": slice(8, None)}.items()
+    ]
+    warnings = tq.fit(sheets, material="neo-hookean+standard-fibres@0", discrepancy="none", noise_sd=0.01).warnings
+    assert not any("directions of the tissue" in warning for warning in warnings)

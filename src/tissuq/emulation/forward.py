@@ -86,6 +86,9 @@ class CallableForward(Forward):
     def run(self, parameters: Mapping[str, float], control: FloatArray) -> Any:
         return _called(self.function, parameters, control)
 
+    def check(self, symbols: Sequence[str]) -> None:
+        _check_arguments(self.function, symbols)
+
     @property
     def identity(self) -> str:
         name = getattr(self.function, "__qualname__", type(self.function).__qualname__)
@@ -120,7 +123,7 @@ class FileForward(Forward):
         return code.path if code else None
 
     def check(self, symbols: Sequence[str]) -> None:
-        _function_at(self.location)
+        _check_arguments(_function_at(self.location), symbols)
 
 
 @dataclass(frozen=True)
@@ -239,13 +242,32 @@ def _called(function: Callable[..., Any], parameters: Mapping[str, float], contr
 
 def _takes_control(function: Callable[..., Any]) -> bool:
     """Return whether a function has a second argument without default, or one that is called control."""
-    try:
-        arguments = list(inspect.signature(function).parameters.values())
-    except (TypeError, ValueError):
-        return False
-    plain = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    second_argument = [argument for argument in arguments if argument.kind in plain][1:2]
+    second_argument = _arguments(function)[1:2]
     return any(argument.default is argument.empty or argument.name == "control" for argument in second_argument)
+
+
+def _check_arguments(function: Callable[..., Any], symbols: Sequence[str]) -> None:
+    """Refuse a function that takes every parameter by itself, as fits of curves elsewhere ask for.
+
+    Raises
+    ------
+    InputError
+        With what it takes, and what it is given.
+    """
+    needed = [argument for argument in _arguments(function) if argument.default is argument.empty]
+    if len(needed) > 2 or any(argument.name in symbols for argument in needed[1:]):
+        names = ", ".join(argument.name for argument in needed)
+        raise InputError(f"the forward model takes {names}, each by itself. {ADVICE}.")
+
+
+def _arguments(function: Callable[..., Any]) -> list[inspect.Parameter]:
+    """Return the arguments that a function takes by position; none where these cannot be known."""
+    try:
+        arguments = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return []
+    plain = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return [argument for argument in arguments if argument.kind in plain]
 
 
 @lru_cache

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["turning_points", "unloading"]
+__all__ = ["REVERSAL", "turning_points", "unloading"]
 
 REVERSAL = 0.1
 """Share of the range of stretches by which a test must go back for a new branch to begin."""

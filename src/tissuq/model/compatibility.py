@@ -54,11 +54,18 @@ def _check_parameters(material: Material, discrepancy: Discrepancy) -> None:
             f"material '{material.name}' consists of fibres only, without stiffness where they are not stretched: add "
             f"a matrix, as in 'neo-hookean+{material.name}'."
         )
-    shared = [p.symbol for p in discrepancy.parameters if p.symbol in [p.symbol for p in material.parameters]]
+    of_material = {parameter.symbol: parameter for parameter in material.parameters}
+    shared = [parameter for parameter in discrepancy.parameters if parameter.symbol in of_material]
     if shared:
+        symbols = ", ".join(parameter.symbol for parameter in shared)
+        advice = (
+            "no data can separate the two. Choose another material or discrepancy."
+            if any(parameter.description == of_material[parameter.symbol].description for parameter in shared)
+            else "a name for two things. Rename those of the material, as in "
+            f"{shared[0].symbol} to {shared[0].symbol}_law, or choose another discrepancy."
+        )
         raise ModelError(
-            f"discrepancy '{discrepancy.name}' adds {', '.join(shared)}, which material "
-            f"'{material.name}' has already: no data can separate the two. Choose another material or discrepancy."
+            f"discrepancy '{discrepancy.name}' adds {symbols}, which material '{material.name}' has already: {advice}"
         )
 
 

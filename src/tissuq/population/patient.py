@@ -25,7 +25,7 @@ from tissuq.prediction.moments import drawn_curves, values_of
 if TYPE_CHECKING:
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["matching_draws", "patient_band", "patient_curves", "patient_posterior"]
+__all__ = ["check_one_control", "matching_draws", "patient_band", "patient_curves", "patient_posterior"]
 
 FloatArray = NDArray[np.float64]
 
@@ -96,6 +96,22 @@ def patient_posterior(population: PopulationDraws) -> Posterior:
     return Posterior(solution, population.complete.solver)
 
 
+def check_one_control(loading: LoadingMode) -> None:
+    """Refuse a loading mode with several controls, in which the stress of a new specimen is not predicted.
+
+    Raises
+    ------
+    InputError
+        With its controls.
+    """
+    if len(loading.controls) > 1:
+        names = ", ".join(control.name for control in loading.controls)
+        raise InputError(
+            f"the stress of a new specimen is predicted in loading modes with one control, and '{loading.name}' has "
+            f"{names}."
+        )
+
+
 def patient_band(
     population: PopulationDraws, loading: LoadingMode, points: FloatArray, prob: float, **options: Any
 ) -> FloatArray:
@@ -118,12 +134,7 @@ def patient_band(
     InputError
         When the loading mode has several controls, or no specimen was measured at a point.
     """
-    if len(loading.controls) > 1:
-        names = ", ".join(control.name for control in loading.controls)
-        raise InputError(
-            f"the stress of a new specimen is predicted in loading modes with one control, and '{loading.name}' has "
-            f"{names}."
-        )
+    check_one_control(loading)
     coordinates, specimens = population.coordinates, population.hierarchy.specimens
     chains, draws, count, size = specimens.shape
     line_values, patients = specimens.reshape(-1, count, size), population.new.reshape(-1, size)

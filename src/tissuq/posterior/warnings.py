@@ -73,6 +73,14 @@ def warnings_about(
         yield ResultWarning(solution.diagnostics.verdict, "not-converged", Severity.PROBLEM)
     if contradiction := solution.model.fitted_errors.contradiction:
         yield ResultWarning(contradiction, "contradicting-tests")
+    if directions := _directions_of_one_fibre(solution.model):
+        yield ResultWarning(
+            f"the tests are along several directions of the tissue ({directions}), while fibres lie at one angle from "
+            "axis 1 of every test: all directions are taken for one, so that the parameters are of none. Fit the tests "
+            "of each direction by themselves, or give tests with the stresses of both axes.",
+            "contradicting-tests",
+            Severity.PROBLEM,
+        )
     if ranges and min(stable_range.probability for stable_range in ranges.values()) < MIN_STABLE_PROBABILITY:
         yield _instability(solution, min(ranges.values(), key=lambda stable_range: stable_range.probability))
     if not solution.is_of_data:
@@ -189,6 +197,13 @@ def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
             text + "Give a larger noise, or leave it unknown ({noise_sd}).", "unmodelled-curve", noise_sd="unknown"
         )
     return ResultWarning(text + "Fit with {discrepancy}.", "unmodelled-curve", discrepancy="auto")
+
+
+def _directions_of_one_fibre(model: StatisticalModel) -> str:
+    """Return the directions of tests with one stress, where there are several and the material has fibres."""
+    curves = [curve for curve in model.experiment.curves if len(curve.mode.stresses) == 1 and curve.direction]
+    directions = dict.fromkeys(curve.direction for curve in curves)
+    return "" if model.material.is_isotropic or len(directions) < 2 else ", ".join(directions)
 
 
 def _is_sum_of_variances(model: StatisticalModel) -> bool:

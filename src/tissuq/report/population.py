@@ -11,14 +11,22 @@ import numpy as np
 
 from tissuq.assessment.extent import has_energy, shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, Use, Verdict
-from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.errors import TissuqError
+from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
 from tissuq.population.uses import PREDICTING, uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
-from tissuq.report.population_figures import MODULUS, Bands, headline, headline_figure, patient_figure, specimens_figure
+from tissuq.report.population_figures import (
+    MODULUS,
+    Bands,
+    Measured,
+    headline,
+    headline_figure,
+    patient_figure,
+    specimens_figure,
+)
 from tissuq.report.population_tables import (
     effects_of_covariates,
     needed_of,
@@ -97,6 +105,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     population, unit, settings = study.population, study.unit, study.settings
     copies, relocated = _copies(study, beside)
     law = relocated["material"]
+    share = _share_of_discrepancy(population, study.warnings)
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
@@ -118,9 +127,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
-        finding=_lead(study),
+        finding=_lead(study) + _about_law(population, share),
         uses=uses,
-        next_step=_next_step(population, study.warnings, settings.without, uses),
+        next_step=_next_step(population, study.warnings, share, settings.without, uses),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
@@ -138,9 +147,16 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
 
 
 def _next_step(
-    population: Population, warnings: Sequence[str], already_without: Sequence[str] = (), uses: Sequence[Use] = ()
+    population: Population,
+    warnings: Sequence[str],
+    share: float = 0.0,
+    already_without: Sequence[str] = (),
+    uses: Sequence[Use] = (),
 ) -> str:
-    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them."""
+    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
+
+    ``share`` is that of the stress which the discrepancy carries.
+    """
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
     if has_code(warnings, "doubtful-reading"):
@@ -161,6 +177,11 @@ def _next_step(
         return (
             "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
             "sets them apart (--covariates)"
+        )
+    if share > PRECISE:
+        return (
+            "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
+            "out; tissuq fit FILE --material all of one specimen says which"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
@@ -204,9 +225,7 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
     )
 
 
-def _sections(
-    study: PopulationStudy, bands: Mapping[LoadingMode, Bands], not_predicted: list[str]
-) -> tuple[Section, ...]:
+def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predicted: list[str]) -> tuple[Section, ...]:
     """Return what a page folds: every parameter, new specimens, specimens, how to read it, how it was computed."""
     population, diagnostics, settings = study.population, study.population.diagnostics, study.settings
     is_one = len(population.symbols) == 1
@@ -222,7 +241,7 @@ def _sections(
         patient.append(
             Picture(
                 "new_patient", lambda: patient_figure(population, bands, study.unit),
-                "Predicted stress of a new specimen", PATIENT_CAPTION, len(study.modes) == 1,
+                "Predicted stress of a new specimen", PATIENT_CAPTION, len(bands) == 1,
             )
         )  # fmt: skip
     if patient:
@@ -262,32 +281,36 @@ def _tolerances(population: Population) -> Tolerances:
 
 
 def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
-    """Return the measurements, with their loading mode where there are several."""
+    """Return the measurements, with their loading mode and the stress where there are several."""
     rows: list[Row] = []
+    has_stresses = any(len(mode.stresses) > 1 for mode in study.modes)
     for name, tests in study.tests.items():
-        for test in tests:
-            labels: Row = {"specimen": name} | ({"mode": test.mode.name} if several else {})
-            pairs = zip(test.stretch, test.stress, strict=True)
-            rows += [labels | {"stretch": float(stretch), "stress": float(stress)} for stretch, stress in pairs]
+        for curve in (curve for test in tests for curve in test.curves):
+            labels: Row = {"specimen": name} | ({"mode": curve.mode.name} if several else {})
+            labels |= {"measured": curve.quantity} if has_stresses else {}
+            pairs = zip(curve.abscissa.tolist(), curve.stress.tolist(), strict=True)
+            rows += [labels | {"stretch": stretch, "stress": stress} for stretch, stress in pairs]
     return rows
 
 
-def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]:
-    """Return the stress of a new specimen in every mode, with the model error and without; and why in some not."""
-    bands, not_predicted = {}, []
+def _bands(study: PopulationStudy) -> tuple[dict[Measured, Bands], list[str]]:
+    """Return every measured stress of a new specimen, with the model error and without; and why some are not there."""
+    bands, not_predicted = dict[Measured, Bands](), []
     for mode in study.modes:
         ranges = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
         reach = np.concatenate(ranges)
         stretch = np.linspace(reach.min(), reach.max(), POINTS)
         try:
-            band, material_alone = (
-                study.population.new_patient(stretch, mode=mode, discrepancy=with_discrepancy, unit="MPa")
-                for with_discrepancy in (True, False)
-            )
-        except ModelError as error:  # some of the population's materials lock before the largest stretch
+            check_one_control(mode)
+            for channel in range(len(mode.stresses)):
+                options: dict[str, Any] = {"mode": mode, "channel": channel, "unit": "MPa"}
+                band, material_alone = (
+                    study.population.new_patient(stretch, discrepancy=with_discrepancy, **options)
+                    for with_discrepancy in (True, False)
+                )
+                bands[mode, channel] = (band, material_alone)
+        except TissuqError as error:  # two controls, or some of the population's materials lock before the largest
             not_predicted.append(f"{mode.name}: {error}")
-        else:
-            bands[mode] = (band, material_alone)
     return bands, not_predicted
 
 
@@ -296,15 +319,19 @@ def _band(table: pd.DataFrame) -> Band:
     return Band(*(table[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
 
 
-def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFrame:
-    """Return the stresses of new specimens, indexed by stretch, and by mode where there are several."""
+def _band_table(bands: Mapping[Measured, Bands], several: bool) -> pd.DataFrame:
+    """Return the stresses of new specimens by stretch, and by mode and stress where there are several."""
     import pandas as pd
 
+    has_stresses = any(len(mode.stresses) > 1 for mode, _ in bands)
     tables = {
-        mode.name: band.merge(material_alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
-        for mode, (band, material_alone) in bands.items()
+        (mode.name,) * several + (mode.stresses[channel],) * has_stresses: band.merge(
+            material_alone, on="stretch", suffixes=("", "_material_alone")
+        ).set_index("stretch")
+        for (mode, channel), (band, material_alone) in bands.items()
     }
-    return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
+    names = ["mode"] * several + ["measured"] * has_stresses
+    return pd.concat(tables, names=names) if names else next(iter(tables.values()))
 
 
 def _copies(study: PopulationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:
@@ -393,22 +420,28 @@ def _lead(study: PopulationStudy) -> str:
         f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
         f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
-    ) + _about_law(study.population, study.warnings)
+    )
 
 
-def _about_law(population: Population, warnings: Sequence[str]) -> str:
-    """Return how far the law alone is from the measurements, as a sentence after others.
-
-    Nothing where it is near, where there is stress at rest, or where that is not known of most specimens.
-    """
-    solutions = [fit.solution for fit in population.posteriors.values() if has_energy(fit.solution.model)]
-    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
-    known = [share for share, _, high in shares if high < 1]
-    is_clear = 2 * len(known) > len(population.posteriors) and not has_code(warnings, "stress-at-rest")
-    if not is_clear or (share := float(np.median(known))) <= PRECISE:
+def _about_law(population: Population, share: float) -> str:
+    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
+    if share <= PRECISE:
         return ""
     law = population.complete.model.material.name
     return (
-        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress "
-        "(median of the specimens). Use it with the discrepancy, as exported cards do, or fit another law."
+        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress (median of the "
+        f"specimens), and cards of a new specimen are of {law} alone."
     )
+
+
+def _share_of_discrepancy(population: Population, warnings: Sequence[str]) -> float:
+    """Return the share of the stress that the discrepancy carries: the median of the specimens.
+
+    Zero where there is stress at rest, or where it is not known of most specimens.
+    """
+    posteriors = population.posteriors
+    solutions = [fit.solution for fit in posteriors.values() if has_energy(fit.solution.model)]
+    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
+    known = [share for share, _, high in shares if high < 1]
+    is_clear = 2 * len(known) > len(posteriors) and not has_code(warnings, "stress-at-rest")
+    return float(np.median(known)) if is_clear else 0.0

@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 
     from tissuq.population import Population
 
-__all__ = ["MODULUS", "Bands", "headline", "headline_figure", "patient_figure", "specimens_figure"]
+__all__ = ["MODULUS", "Bands", "Measured", "headline", "headline_figure", "patient_figure", "specimens_figure"]
 
 Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
 """Stress of a new specimen with the model error, and of the material alone."""
+Measured: TypeAlias = tuple[LoadingMode, int]
+"""A loading mode and the number of one of its stresses."""
 MODULUS = "initial shear modulus"
 
 
@@ -66,34 +68,34 @@ def specimens_figure(population: Population, unit: StressUnit) -> Figure:
     return figure
 
 
-def patient_figure(population: Population, bands: Mapping[LoadingMode, Bands], unit: StressUnit) -> Figure:
+def patient_figure(population: Population, bands: Mapping[Measured, Bands], unit: StressUnit) -> Figure:
     """Return the stress of a new specimen, with and without the model error, over the curves of the specimens.
 
     Parameters
     ----------
     population : Population
-    bands : mapping of LoadingMode to two pandas.DataFrame
+    bands : mapping of LoadingMode and number of a stress to two pandas.DataFrame
         From `Population.new_patient`, with the discrepancy and without; a panel each.
     unit : StressUnit
     """
     with new_figure(6.6 if len(bands) == 1 else min(4.6 * len(bands), 13.8), 4.2) as figure:
         panels = figure.subplots(1, len(bands), squeeze=False)[0]
-        for axis, (mode, mode_bands) in zip(panels, bands.items(), strict=True):
-            _draw_patient(axis, population, mode, mode_bands, unit)
-        panels[0].set_ylabel(f"engineering stress [{unit.name}]")
+        for axis, (measured, bands_of_stress) in zip(panels, bands.items(), strict=True):
+            _draw_patient(axis, population, measured, bands_of_stress, unit)
         panels[0].legend(fontsize=9)
         if len(bands) == 1:
-            panels[0].set_title(f"Expected for a new specimen: {next(iter(bands)).name}")
+            panels[0].set_title(f"Expected for a new specimen: {next(iter(bands))[0].name}")
         else:
             figure.suptitle("Expected for a new specimen")
     return figure
 
 
-def _draw_patient(axis: Axes, population: Population, mode: LoadingMode, bands: Bands, unit: StressUnit) -> None:
-    tests = [test for posterior in population.posteriors.values() for test in posterior.model.experiment.tests]
-    for index, data in enumerate(test for test in tests if test.mode == mode):
-        order = np.argsort(data.stretch, kind="stable")
-        axis.plot(data.stretch[order], data.stress[order] / unit.to_mpa, color=BASE, lw=0.7, alpha=0.7,
+def _draw_patient(axis: Axes, population: Population, measured: Measured, bands: Bands, unit: StressUnit) -> None:
+    mode, channel = measured
+    curves = [curve for posterior in population.posteriors.values() for curve in posterior.model.experiment.curves]
+    for index, curve in enumerate(curve for curve in curves if (curve.mode, curve.channel) == measured):
+        order = np.argsort(curve.points, kind="stable")
+        axis.plot(curve.points[order], curve.stress[order] / unit.to_mpa, color=BASE, lw=0.7, alpha=0.7,
                   label="" if index else "measured specimens")  # fmt: skip
     band, material_alone = bands
     low, high = band["low"] / unit.to_mpa, band["high"] / unit.to_mpa
@@ -103,4 +105,5 @@ def _draw_patient(axis: Axes, population: Population, mode: LoadingMode, bands: 
         axis.plot(material_alone["stretch"], material_alone[end] / unit.to_mpa, ":", color=TRUTH, lw=1.4,
                   label="" if end == "high" else "95 % of the material alone")  # fmt: skip
     axis.set_xlabel(mode.controls[0].name)
+    axis.set_ylabel(f"{mode.stresses[channel]} [{unit.name}]")
     axis.set_title(mode.name)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tissuq.population.effects import ALL_COVARIATES
 from tissuq.population.sample_size import MAX_SPECIMENS
 from tissuq.report.result import Table
-from tissuq.report.tables import percent, significant
+from tissuq.report.tables import interval, percent
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -30,11 +30,9 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
     for row in population.effects(unit=study.unit.name).reset_index().to_dict("records"):
         symbol, name = str(row["parameter"]), str(row["covariate"])
         is_share = row["kind"] == "share"
-        digits = 4 if row["kind"] == "factor" else 3
-        low, median, high = (
-            percent(row[end]) if is_share else significant(row[end], digits)
-            for end in ("hdi_low", "median", "hdi_high")
-        )
+        numbers = [row[end] for end in ("hdi_low", "median", "hdi_high")]
+        sd = (numbers[2] - numbers[0]) / 4
+        low, median, high = (percent(number) if is_share else interval(number, number, sd)[0] for number in numbers)
         unit = population.unit_of(symbol, study.unit).name if row["kind"] == "difference" else ""
         sign = "× " if row["kind"] == "factor" else ""
         words = f"{sign}{median}{f' {unit}' * bool(unit)} {row['per']}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -124,14 +123,13 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         return {name: of_one for name, of_one in readings.items() if name not in self.without}
 
     def _all_readings(self, folder: Path) -> dict[str, list[Reading]]:
-        from tissuq.experiments.reading.specimens_in_files import read_column
+        from tissuq.experiments.reading.specimens_in_files import of_specimen, read_column
         from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 
         sources = self.sources(folder)
         if self.specimen is not None:
             (file,) = next(iter(sources.values()))
-            readings = read_column(file, self.specimen, **self.reading_options)
-            return {name: [reading] for name, reading in readings.items()}
+            return read_column(file, self.specimen, **self.reading_options)
         specimens: dict[str, list[Reading]] = {}
         for name, files in sources.items():
             is_one_of_several, options = len(files) > 1, self.reading_options
@@ -143,6 +141,5 @@ class PopulationSettings(FittedSettings, ReadingSettings):
             for test in tests:
                 is_one = len(files) > 1 or len(tests) == 1
                 specimen = name if is_one else test.reading.experiment.specimen or test.name
-                experiment = test.reading.experiment.labelled(name=specimen, specimen=specimen)
-                specimens.setdefault(specimen, []).append(replace(test.reading, experiment=experiment))
+                specimens.setdefault(specimen, []).append(of_specimen(test.reading, specimen))
         return specimens

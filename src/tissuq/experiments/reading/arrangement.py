@@ -51,7 +51,8 @@ def transposed_table(file: str, content: Lines, separator: str | None, sheet: st
     first_column = next((k for k, (_, column) in enumerate(rows) if column), len(rows))
     columns = [column for _, column in rows[first_column:] if column]
     is_whole = len(columns) == len(rows) - first_column and len({len(values) for _, _, values in columns}) == 1
-    if not is_whole or sum(is_of_role(name) for name, _, _ in columns) < 2:
+    are_different = len({name for name, _, _ in columns}) == len(columns)  # and not labels of rows, such as Stretch
+    if not is_whole or not are_different or sum(is_of_role(name) for name, _, _ in columns) < 2:
         return None
     names, units, values = zip(*columns, strict=True)
     cells = list(zip(*values, strict=True))

@@ -221,8 +221,7 @@ def _from_distance(
     if "length" not in dimensions.set_by_user and share > LITTLE_LOAD:
         raise InputError(
             f"{table.place(choice.deformation, 0)}: the distance begins at {values[0]:g} px with {100 * share:.0f} % "
-            "of the "
-            f'largest load. Give the undeformed distance in pixels: --length "{values[0]:.4g} px" (in Python '
+            f'of the largest load. Give the undeformed distance in pixels: --length "{values[0]:.4g} px" (in Python '
             f'length="{values[0]:.4g} px") if it is that, or the one it is.'
         )
     column = f"column {table.label(choice.deformation)} in px"

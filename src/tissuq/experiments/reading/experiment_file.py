@@ -308,18 +308,18 @@ def read_rows(
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
     direction = direction_of(*(text for _, text in table.head), *names)
     recorded = with_signs(measured, choices, options, direction)
-    cycles = find_cycles(table, recorded.course)
+    reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
+    cycles = find_cycles(table, recorded.course, reference)
     used = recorded.of_cycle(cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
         used = used.without_lines(lines, absent)
-    reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
     if (preload := options.get("preload")) == AUTO:
         slacks = [tested.slack for tested in tested_stresses(used, mode, shown)]
         used = used.loaded(slacks, reference)
         errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
     elif preload is not None:
         thresholds = [load.stress_in(preload) for load in loads]
-        used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference, shown)
+        used = used.taut(preload, thresholds, find_cycles(used.table, used.course, reference)[0].peak, reference, shown)
     if (stretch_range := options.get("stretch_range")) is not None:
         used = used.within(*stretch_range)
     if options.get("until_peak"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from tissuq.experiments.checked_arrays import LARGE_STRETCH
-from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.modes import Biaxial, Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.disturbances import scatter_of_neighbours
 from tissuq.experiments.reading.experiment_file import Reading
@@ -47,6 +48,11 @@ SAME_PEAK = 0.02
 MIN_CONTRACTION = 0.2
 """Smallest strain across over that along the axis, of the other sign, of a specimen that is free there: 0.5 of an
 isotropic one."""
+SHEAR = re.compile(r"[fu]_?(12|21|xy|yx)|(?P<tensor>e|ε|epsilon|eps)_?(12|21|xy|yx)|(γ|gamma)_?(12|xy)?")
+"""Names of components that shear the plane: of the deformation gradient, of a strain tensor, or the amount of shear."""
+NOTABLE_SHEAR = 0.2
+"""Amount of shear over the largest strain of an axis that is worth a word: squared stretches at 45 degrees change by a
+tenth of what the stretches along the axes change them by."""
 REGION_CODES: Mapping[str, tuple[str, Severity]] = {
     "slack": ("slack", Severity.CAUTION),
     "resolution": ("measurements", Severity.NOTE),  # a fit allows for it
@@ -316,6 +322,30 @@ def _other_axis(reading: Reading, number: int) -> str:
     )
 
 
+def _shear(reading: Reading, _: int) -> str:
+    """Return a sentence about a biaxial test whose sheet was sheared, too."""
+    if not isinstance(reading.experiment.mode, Biaxial):
+        return ""
+    table, amount, columns = reading.used.table, np.zeros(len(reading.used)), list[int]()
+    for column, quantity in enumerate(table.quantities):
+        component = SHEAR.fullmatch(quantity)
+        values = readable_shares(table, column) if component else None
+        if component and values is not None and values.any():
+            amount = amount + (2 if component["tensor"] else 1) * values
+            columns.append(column)
+    strain = max(float(np.abs(stretch - 1).max()) for stretch in reading.used.stretch)
+    largest = float(np.abs(amount).max())
+    if largest <= NOTABLE_SHEAR * strain:
+        return ""
+    several = len(columns) > 1
+    return (
+        f"column{'s' * several} {' and '.join(map(table.label, columns))} say{'s' * (not several)} that the sheet was "
+        f"sheared, too, by up to {largest:.2g} beside strains of up to {strain:.2g}; a biaxial test is read without "
+        "shear, which fibres that lie across feel. Fit tests, or rows, with less of it, mounted along the axes of the "
+        "tissue."
+    )
+
+
 def _is_loaded(table: Table, stress: int, column: int) -> bool:
     """Tell whether a column of forces across is a notable share of those along the axis."""
     along, across = (float(np.abs(numbers).max()) for numbers in table.numbers([stress, column]))
@@ -338,6 +368,7 @@ def _is_held(reading: Reading, number: int, column: int) -> bool:
 CAUTION, NOTE = ("measurements", Severity.CAUTION), ("measurements", Severity.NOTE)
 CHECKS: Mapping[Callable[[Reading, int], str], tuple[str, Severity]] = {
     _other_axis: CAUTION,
+    _shear: CAUTION,
     _size: CAUTION,
     _stretch_size: CAUTION,
     _cycles: CAUTION,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.branches import turning_points
+from tissuq.experiments.branches import REVERSAL, turning_points
 from tissuq.experiments.reading.disturbances import ends_of_rests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
@@ -306,8 +306,11 @@ def _taut_start(
     return _TautStart(row, float(reference), words)
 
 
-def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
-    """Return the cycles of a test, by the file's column of cycles where it has several, else by turning points."""
+def find_cycles(table: Table, stretch: Column, rest: float) -> list[Cycle]:
+    """Return the cycles of a test, by the file's column of cycles where it has several, else by turning points.
+
+    Where a test goes to both sides of ``rest``, the way back to it at the end belongs to the last cycle.
+    """
     labels = _cycle_labels(table)
     starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1]), len(labels)]
     if len(starts) > 2:
@@ -317,6 +320,9 @@ def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
         return [Cycle(labels[s], s, p, t) for (s, t), p in zip(pairwise(starts), peaks, strict=True)]
     ends = [0, *turning_points(stretch), len(stretch) - 1]
     bounds = [*ends[0:-1:2], ends[-1]]
+    is_at_rest = np.abs(stretch[bounds[-2:]] - rest) <= REVERSAL * np.ptp(stretch)
+    if len(bounds) > 2 and len(ends) % 2 == 0 and is_at_rest.tolist() == [False, True]:
+        bounds.pop(-2)
     return [
         Cycle(str(number), start, ends[2 * number - 1], stop + (stop == len(stretch) - 1))
         for number, (start, stop) in enumerate(pairwise(bounds), start=1)

@@ -166,7 +166,7 @@ class TestedStress:
 
 def tested_stresses(used: MeasuredRows, mode: LoadingMode, unit: StressUnit) -> tuple[TestedStress, ...]:
     """Return every stress of the rows that are used; ``unit`` is that in which people want to read them."""
-    cycles = find_cycles(used.table, used.course)
+    cycles = find_cycles(used.table, used.course, mode.controls[0].reference)
     return tuple(TestedStress(used, number, cycles, mode, unit) for number in range(len(used.labels)))
 
 

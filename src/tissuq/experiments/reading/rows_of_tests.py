@@ -176,13 +176,16 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
         if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
             continue
         are_cycles = all(plain(label).rstrip("0123456789 .#") in CYCLE_NAMES for label in distinct)
-        is_of_tests = _begin_anew(labels, distinct, course) and not are_cycles
+        is_of_tests = _goes_again(labels, distinct, course) and not are_cycles
         if is_of_specimens(quantity) or is_of_tests or len(modes_in_column(table, column)) > 1:
             yield column, labels
 
 
-def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) -> bool:
-    """Tell whether each label has its own rows, one after another, in which the same way is gone again."""
+def _goes_again(labels: Sequence[str], distinct: Sequence[str], course: Column) -> bool:
+    """Tell whether each label has its own rows, one after another, in which the same way is gone again.
+
+    They begin at the same stretch, or where the way back to their beginning was not measured.
+    """
     starts = [0, *(row for row in range(1, len(labels)) if labels[row] != labels[row - 1]), len(labels)]
     if len(starts) != len(distinct) + 1:
         return False
@@ -191,7 +194,7 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
     furthest = np.array([test[np.argmax(np.abs(test - test[0]))] for test in tests])
     ways = furthest - begins
     is_same_way = bool((ways > 0).all() or (ways < 0).all()) and np.abs(ways).min() >= RETURN * np.abs(ways).max()
-    return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
+    return is_same_way and (bool(np.ptp(begins) <= RESTART * np.ptp(course)) or jump(labels, course))
 
 
 def jump(labels: Sequence[str], course: Column) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Unpack
@@ -13,15 +13,24 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import find_column
-from tissuq.experiments.reading.experiment_file import Reading, read_rows, table_of
+from tissuq.experiments.reading.experiment_file import Reading, table_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format
 from tissuq.experiments.reading.layout import WHITESPACE, is_comment, split
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.rows_of_tests import only_rows, row_names
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 from tissuq.experiments.reading.text_file import read_lines
 
-__all__ = ["SUFFIXES", "CovariateTable", "covariate_columns", "find_tests", "read_column", "read_covariates"]
+__all__ = [
+    "SUFFIXES",
+    "CovariateTable",
+    "covariate_columns",
+    "find_tests",
+    "of_specimen",
+    "read_column",
+    "read_covariates",
+]
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet")
 """Of files in a folder that may hold measurements."""
@@ -58,8 +67,8 @@ def find_tests(
 
 def read_column(
     path: str | os.PathLike[str], specimen: str | int, **options: Unpack[ReadingOptions]
-) -> dict[str, Reading]:
-    """Return what is read of each specimen that a column of one file names, in the order of the file.
+) -> dict[str, list[Reading]]:
+    """Return what is read of the tests of each specimen that a column of one file names, in the order of the file.
 
     Parameters
     ----------
@@ -69,7 +78,8 @@ def read_column(
     options
         As for `tissuq.read_experiment`.
     """
-    table = only_rows(table_of(path, options), options.get("only"))
+    only = options.get("only") or {}
+    table = only_rows(table_of(path, options), only)
     column = find_column(table, "specimen", specimen)
     labels = np.array(row_names(table, column))
     if (labels == "").any():
@@ -77,9 +87,15 @@ def read_column(
         raise InputError(f"{table.place(column, row)}: the name of the specimen is missing.")
     readings = {}
     for label in dict.fromkeys(labels.tolist()):
-        named_options: ReadingOptions = {**options, "name": label}
-        readings[label] = read_rows(table.taken(np.flatnonzero(labels == label)), path, **named_options)
+        of_label: ReadingOptions = {**options, "only": {**only, table.key(column): label}}
+        tests = find_tests_in_file(path, is_one_of_several=True, **of_label)
+        readings[label] = [of_specimen(test.reading, label) for test in tests]
     return readings
+
+
+def of_specimen(reading: Reading, specimen: str) -> Reading:
+    """Return what was read of a test, named after its specimen."""
+    return replace(reading, experiment=reading.experiment.labelled(name=specimen, specimen=specimen))
 
 
 def _in_folder(folder: Path) -> dict[Path, list[Path]]:
