@@ -264,6 +264,11 @@ SHEAR = np.array([0.0, 0.5, 1.0, 1.5])
         ("F11,F22,F12,F21", [0.02 * SHEAR, 0.01 * SHEAR], ""),
         ("stretch x,stretch y,E12,note", [0.04 * SHEAR, 1 + SHEAR], "column 'E12' says that the sheet was sheared"),
         ("stretch x,stretch y,E12,note", [0.015 * SHEAR, 1 + SHEAR], ""),
+        ("F11,F22,F12,E12", [0.04 * SHEAR, 0.02 * SHEAR], ""),  # one shear, in two measures
+        ("stretch x,stretch y,E12,E21", [0.015 * SHEAR, 0.015 * SHEAR], ""),
+        ("F11,F22,F12,E12", [0.06 * SHEAR, 0.03 * SHEAR], "columns 'F12' and 'E12' say that the sheet was sheared"),
+        ("stretch x,stretch y,gamma [deg],E12 [µε]", [2 * SHEAR, 2e4 * SHEAR], ""),
+        ("stretch x,stretch y,gamma [deg],E12 [MPa]", [5 * SHEAR, 1 + SHEAR], "column 'gamma [deg]' says that"),
     ],
 )
 def test_a_sheet_that_was_sheared_too_is_doubted(tmp_path, names, components, said):

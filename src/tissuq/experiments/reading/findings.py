@@ -48,7 +48,7 @@ SAME_PEAK = 0.02
 MIN_CONTRACTION = 0.2
 """Smallest strain across over that along the axis, of the other sign, of a specimen that is free there: 0.5 of an
 isotropic one."""
-SHEAR = re.compile(r"[fu]_?(12|21|xy|yx)|(?P<tensor>e|ε|epsilon|eps)_?(12|21|xy|yx)|(γ|gamma)_?(12|xy)?")
+SHEAR = re.compile(r"(?P<gradient>[fu])_?(12|21|xy|yx)|(?P<tensor>e|ε|epsilon|eps)_?(12|21|xy|yx)|(γ|gamma)_?(12|xy)?")
 """Names of components that shear the plane: of the deformation gradient, of a strain tensor, or the amount of shear."""
 NOTABLE_SHEAR = 0.2
 """Amount of shear over the largest strain of an axis that is worth a word: squared stretches at 45 degrees change by a
@@ -326,17 +326,18 @@ def _shear(reading: Reading, _: int) -> str:
     """Return a sentence about a biaxial test whose sheet was sheared, too."""
     if not isinstance(reading.experiment.mode, Biaxial):
         return ""
-    table, amount, columns = reading.used.table, np.zeros(len(reading.used)), list[int]()
+    table, amounts = reading.used.table, dict[str, dict[int, Column]]()
     for column, quantity in enumerate(table.quantities):
         component = SHEAR.fullmatch(quantity)
         values = readable_shares(table, column) if component else None
         if component and values is not None and values.any():
-            amount = amount + (2 if component["tensor"] else 1) * values
-            columns.append(column)
+            of_one_measure = amounts.setdefault(component["gradient"] or quantity, {})
+            of_one_measure[column] = (2 if component["tensor"] else 1) * values
     strain = max(float(np.abs(stretch - 1).max()) for stretch in reading.used.stretch)
-    largest = float(np.abs(amount).max())
+    largest = max((float(np.abs(sum(of_one.values())).max()) for of_one in amounts.values()), default=0.0)
     if largest <= NOTABLE_SHEAR * strain:
         return ""
+    columns = [column for of_one in amounts.values() for column in of_one]
     several = len(columns) > 1
     return (
         f"column{'s' * several} {' and '.join(map(table.label, columns))} say{'s' * (not several)} that the sheet was "

@@ -11,6 +11,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.units import ANGLE, strain_factor
 
 __all__ = [
     "DOUBTFUL_STRAIN",
@@ -217,12 +218,13 @@ def poisson_ratio(along: Column, across: Column) -> tuple[float, float]:
 
 
 def readable_shares(table: Table, number: int) -> Column | None:
-    """Return a column (n,) of stretches or strains, of which percentages are shares; None where a cell is faulty."""
+    """Return a column (n,) of stretches, strains or angles as plain ratios; None of other units or faulty cells."""
+    unit = table.unit(number)
     try:
         (values,) = table.numbers([number])
+        return values * (ANGLE.factor_or_none(unit) or strain_factor(unit))
     except InputError:
         return None
-    return values / (100 if table.unit(number) == "%" else 1)
 
 
 def _lateral(table: Table, number: int, along: Column) -> tuple[int, Column] | None:
