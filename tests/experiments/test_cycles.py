@@ -47,6 +47,11 @@ def test_a_last_way_that_starts_at_rest_is_a_cycle_whether_it_reaches_the_peak_o
         assert found(written(np.concatenate([cycle, ramp]))) == [(0, 30, 60), (60, 80, 81)]
 
 
+def test_the_last_way_back_of_a_test_that_begins_stretched_is_a_cycle_unless_it_was_compressed_too(written):
+    there, back = np.linspace(1, 1.2, 21)[1:], np.linspace(1.2, 1, 21)
+    assert found(written(np.concatenate([back, there, back[1:]]))) == [(0, 20, 40), (40, 60, 61)]
+
+
 def test_noise_and_holds_make_no_cycles(written):
     random = np.random.default_rng(3)
     stretch = np.concatenate([np.linspace(1, 1.3, 200), np.full(50, 1.3), np.linspace(1.3, 1.0, 200)])

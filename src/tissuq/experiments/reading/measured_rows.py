@@ -320,8 +320,10 @@ def find_cycles(table: Table, stretch: Column, rest: float) -> list[Cycle]:
         return [Cycle(labels[s], s, p, t) for (s, t), p in zip(pairwise(starts), peaks, strict=True)]
     ends = [0, *turning_points(stretch), len(stretch) - 1]
     bounds = [*ends[0:-1:2], ends[-1]]
-    is_at_rest = np.abs(stretch[bounds[-2:]] - rest) <= REVERSAL * np.ptp(stretch)
-    if len(bounds) > 2 and len(ends) % 2 == 0 and is_at_rest.tolist() == [False, True]:
+    margin = REVERSAL * np.ptp(stretch)
+    is_reversed = rest - stretch.min() > margin and stretch.max() - rest > margin
+    is_at_rest = np.abs(stretch[bounds[-2:]] - rest) <= margin
+    if is_reversed and len(bounds) > 2 and len(ends) % 2 == 0 and is_at_rest.tolist() == [False, True]:
         bounds.pop(-2)
     return [
         Cycle(str(number), start, ends[2 * number - 1], stop + (stop == len(stretch) - 1))
