@@ -46,8 +46,8 @@ OTHER_QUANTITIES = {
     "a load before the test": r"\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
     "an amplitude, and no curve": r"amplitud|амплитуд|振幅",
     "what was asked of the machine, and not measured": r"set ?point|command|demand|sollwert",
-    "a multiple by a power of ten, which belongs into its unit, as in (10^-3 MPa)": r"((?<!\w)x|[×*·]) ?"
-    r"(10( ?\^| ?\*\*| \d|[⁻⁰¹²³⁴-⁹])|1e ?\d)",
+    "a multiple by a power of ten, which belongs into its unit, as in (10^-3 MPa)": r"((?<!\w)x|[×*·/]) ?"
+    r"(10( ?\^| ?\*\*| \d|[⁻⁰¹²³⁴-⁹])|1e ?\d)|^10( ?\^| ?\*\*|[⁻⁰¹²³⁴-⁹])",
     "an offset": r"\boffset|versatz|смещение нуля",
     "an error": r"\berror|fehler|residuals?$",
     "a logarithm": r"\b(log|lg|ln)(10)?\b(?! strain)|logarithm of",
