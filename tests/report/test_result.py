@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from html import unescape
 from math import inf, nan
 from pathlib import Path
 
@@ -239,6 +240,13 @@ def test_a_problem_stands_above_the_answer(capsys):
 def test_a_number_that_is_not_to_be_reported_does_not_stand_out(verdict, classes, tmp_path):
     write_result(result_of(uses=(Use("report it", verdict, "known to ± 90 %"),)), tmp_path, figures=False)
     assert f'<p class="{classes}">' in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_page_has_the_recipe_as_it_is_in_the_file(tmp_path):
+    write_result(result_of(recipe=Settings(file="strain of 10 % <b>.csv")), tmp_path, figures=False)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    recipe = (tmp_path / "run.toml").read_text(encoding="utf-8")
+    assert recipe in map(unescape, re.findall(r"<pre [^>]*>(.*?)</pre>", page, re.DOTALL))
 
 
 def test_no_line_ends_before_the_sign_of_a_percentage(capsys):

@@ -1,4 +1,4 @@
-"""Numbers as laboratories write them, alone, with a spread and with a unit."""
+"""Numbers as laboratories write them, alone, with a spread and with a unit, and on one line with their percent sign."""
 
 from __future__ import annotations
 
