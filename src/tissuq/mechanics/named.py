@@ -55,8 +55,8 @@ def standard_name(name: str) -> str:
 
     Examples
     --------
-    >>> standard_name("neo-hookean+exponential-fibres"), standard_name("rivlin:C20,C10"), standard_name("auto")
-    ('holzapfel-gasser-ogden', 'rivlin:C10,C20', 'auto')
+    >>> standard_name("neo-hookean+exponential-fibres"), standard_name("auto")
+    ('holzapfel-gasser-ogden', 'auto')
     """
     try:
         return material_named(name).name
