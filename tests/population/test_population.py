@@ -13,7 +13,7 @@ from scipy.stats import norm, truncnorm
 
 import tissuq as tq
 from tissuq.assessment.uses import Use, Verdict
-from tissuq.population.uses import PREDICTING
+from tissuq.population.uses import NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report import population
 from tissuq.report.population import _next_step
@@ -443,6 +443,7 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     population = SimpleNamespace(
         posteriors=fits, converged=True, symbols=("C10",), coordinates=SimpleNamespace(is_log=[True]),
         summary=lambda: {"median": {("C10", "spread"): 0.3}},
+        complete=SimpleNamespace(model=SimpleNamespace(discrepancy=SimpleNamespace(is_best_fit=False))),
     )  # fmt: skip
     assert list(far_specimens(population)) == ["soft"]
     (warning,) = _far_specimens(population)
@@ -456,6 +457,15 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert _next_step(population, [], share=0.3).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
     assert "--aim 20%" in _next_step(population, [], uses=useless)
+    assert _next_step(population, [], uses=useless, has_aim=True).startswith("find out what sets the specimens apart")
+    assert _next_step(population, [], share=0.3, uses=useless, has_aim=True).startswith("fit another law")
+    not_predicted = [Use(PREDICTING, Verdict.NO, NOT_PREDICTED)]
+    assert "finite elements" in _next_step(population, [], uses=not_predicted)
+    at_rest = ResultWarning("there is stress.", "stress-at-rest")
+    assert _next_step(population, [at_rest], uses=useless).startswith("take off what the load cell shows at rest")
+    population.complete.model.discrepancy.is_best_fit = True
+    assert _next_step(population, [], uses=useless).endswith("--discrepancy auto")
+    population.complete.model.discrepancy.is_best_fit = False
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
     assert _next_step(population, []).startswith("find out why the specimens differ so much")
 

@@ -14,9 +14,10 @@ from tissuq.population.warnings import far_specimens, has_few_specimens
 from tissuq.prediction.bands import Band
 from tissuq.result_warning import has_code
 
-__all__ = ["PREDICTING", "uses_of_population"]
+__all__ = ["NOT_PREDICTED", "PREDICTING", "uses_of_population"]
 
 PREDICTING = "predict a new specimen"
+NOT_PREDICTED = "its stress is not predicted in the modes that were measured"
 
 
 def uses_of_population(
@@ -74,7 +75,7 @@ def _reporting(population: Population) -> tuple[Verdict, str]:
 def _predicting(population: Population, bands: Sequence[Band]) -> tuple[Verdict, str]:
     """Return whether the stress of a specimen that was not measured can be predicted, where others were."""
     if not bands:
-        return Verdict.NO, "its stress is not predicted in the modes that were measured"
+        return Verdict.NO, NOT_PREDICTED
     verdict, width = precision_of(max(map(relative_half_width, bands)))
     sentence = f"its stress {width} on average where specimens were measured, their spread included"
     if beyond := population.covariates.beyond(population.patient_covariates):

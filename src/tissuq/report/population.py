@@ -14,7 +14,7 @@ from tissuq.assessment.uses import PRECISE, Use, Verdict
 from tissuq.errors import TissuqError
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import PREDICTING, uses_of_population
+from tissuq.population.uses import NOT_PREDICTED, PREDICTING, uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -129,7 +129,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         numbers=_numbers(study),
         finding=_lead(study) + _about_law(population, share),
         uses=uses,
-        next_step=_next_step(population, study.warnings, share, settings.without, uses),
+        next_step=_next_step(population, study.warnings, share, settings.without, uses, has_aim=needed is not None),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
@@ -152,10 +152,12 @@ def _next_step(
     share: float = 0.0,
     already_without: Sequence[str] = (),
     uses: Sequence[Use] = (),
+    *,
+    has_aim: bool = False,
 ) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
 
-    ``share`` is that of the stress which the discrepancy carries.
+    ``share`` is that of the stress which the discrepancy carries; with an aim, the page has the number that it takes.
     """
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
@@ -167,13 +169,19 @@ def _next_step(
             f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
+    if has_code(warnings, "stress-at-rest"):
+        return "take off what the load cell shows at rest, as the warning about it says, and fit again"
+    if population.complete.model.discrepancy.is_best_fit:
+        return "let the data decide how wrong the material is: fit again with --discrepancy auto"
     spread = float(population.summary()["median"][population.symbols[0], "spread"])
     if population.coordinates.is_log[0] and spread > WIDE_SPREAD:
         return (
             "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
             "compute with a new one"
         )
-    if any(use.purpose == PREDICTING and use.verdict is Verdict.NO for use in uses):
+    against = [use.reason for use in uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
+    is_too_wide = any(reason != NOT_PREDICTED for reason in against)
+    if is_too_wide and not has_aim:
         return (
             "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
             "sets them apart (--covariates)"
@@ -183,6 +191,8 @@ def _next_step(
             "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
             "out; tissuq fit FILE --material all of one specimen says which"
         )
+    if is_too_wide:
+        return "find out what sets the specimens apart (--covariates); how many it takes stands beneath the parameters"
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
 
