@@ -29,9 +29,12 @@ class Copies:
         self.files: dict[str, Path] = {}
 
     def of_file(self, file: Path, folder: str = INPUT, name: str = "") -> str:
-        """Return what the copy of a file is called, by its name there unless another is given."""
-        copy = f"{folder}/{name or file.name}"
-        self.files[copy] = file
+        """Return what the copy of a file is called: its name or the given one, numbered if that is taken."""
+        name, number = name or file.name, 1
+        copy = f"{folder}/{name}"
+        while self.files.setdefault(copy, file) != file:
+            number += 1
+            copy = f"{folder}/{number}-{name}"
         return copy
 
     def of_code(self, text: str) -> str:
@@ -57,12 +60,8 @@ def inputs_of(settings: SpecimenSettings, experiment: Experiment, sources: Seque
     """Return what a fit started from; ``sources`` are the files that were read, one a test."""
     copies, several_laws = Copies(), isinstance(settings, LawSettings)
     named = list(settings.laws) if isinstance(settings, LawSettings) else [settings.material]
-    names, files = list(map(copies.of_law, named)), list(dict.fromkeys(sources))
-    stems = [file.name for file in files]
-    copy_of = {
-        file: copies.of_file(file, name=f"{number}-{file.name}" if stems.count(file.name) > 1 else "")
-        for number, file in enumerate(files, 1)
-    }
+    names = list(map(copies.of_law, named))
+    copy_of = {file: copies.of_file(file) for file in sources}
     relocated = _relocated(settings, experiment, sources, copy_of)
     relocated |= {"laws": tuple(names)} if several_laws else {"material": names[0]}
     without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
