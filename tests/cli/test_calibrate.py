@@ -8,6 +8,8 @@ import json
 import numpy as np
 import pytest
 
+from tissuq.studies.calibration import _are_proportional
+
 from .conftest import command, run_in, tree
 
 MODEL = """
@@ -306,6 +308,19 @@ def test_the_posterior_of_other_measurements_is_a_prior(fitted):
     options += ["--noise-sd", 0.02, "--no-figures"]
     said = run_in(fitted, "calibrate", "other.csv", *options, "--prior-run", "run", "--runs", 8, "--out", "other")
     assert said.status == 0, said.err
+
+
+@pytest.mark.parametrize(
+    ("stress", "force", "is_same"),
+    [
+        ([1.0, 2.1, 3.3, 4.6], [20.0, 42.0, 66.0, 92.0], True),
+        ([1.0, 2.1, 3.3, 4.6], [20.0, 42.0, 66.0, 93.0], False),
+        ([1.0, 2.0, 3.0, 4.0], [20.0, 40.0, 60.0, 80.0], False),  # equal steps of load, which other tests have as well
+        ([1.0, 2.1, 3.3], [20.0, 42.0, 66.0], False),  # so few may be proportional by chance
+    ],
+)
+def test_measurements_in_another_unit_are_known_by_their_ratios(stress, force, is_same):
+    assert _are_proportional(np.array(stress), np.array(force)) == is_same
 
 
 def test_a_material_without_its_range_or_parameters_is_refused_before_any_run(tmp_path):

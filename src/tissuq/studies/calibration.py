@@ -199,8 +199,13 @@ def _columns_of_inputs(settings: CalibrationSettings, measured: Measured, run: P
 
 
 def _are_proportional(values: FloatArray, others: FloatArray) -> bool:
-    """Return whether values are others in another unit or over another area; of a few, any may be by chance."""
+    """Return whether values are others in another unit or over another area.
+
+    A few may be so by chance, and equal steps, as of prescribed loads, are so in any two tests.
+    """
     if values.shape != others.shape or len(values) < PROPORTIONAL_BY_CHANCE or not values.any():
+        return False
+    if agree(values, np.linspace(values[0], values[-1], len(values)), FOUR_DIGITS):
         return False
     return agree(others, values * (values @ others / (values @ values)), FOUR_DIGITS)
 
