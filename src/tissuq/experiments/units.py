@@ -147,7 +147,7 @@ def stress_unit(text: str) -> StressUnit:
         raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
     if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
-    factor, spelling = COMMON_STRESS_UNITS.get(compact), name.lower() if name.lower() in WORDS else in_latin(name)
+    factor, spelling = PRESSURE.factors.get(compact), name.lower() if name.lower() in WORDS else in_latin(name)
     return StressUnit(PASCALS.get(name.lower(), name), stress_factor(spelling) if factor is None else factor)
 
 
