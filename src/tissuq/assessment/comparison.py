@@ -310,11 +310,13 @@ def warnings_of_evidence(evidences: Mapping[str, tuple[float | None, float | Non
     if not doubtful:
         return ()
     widest = max(doubtful, key=error_beside_best)
+    error = error_beside_best(widest)
+    size = f"{error:.2g}" if np.isfinite(error) else "unknown"
     return (
         ResultWarning(
             f"whether {best} or {' or '.join(doubtful)} has the most evidence is not known: the log evidences differ "
-            f"by {known[best] - known[widest]:.2g}, and the error of the integration is {error_beside_best(widest):.2g}"
-            f" ({widest}). Do not choose by their probabilities, but by how they predict left-out measurements.",
+            f"by {known[best] - known[widest]:.2g}, and the error of the integration is {size} "
+            f"({widest}). Do not choose by their probabilities, but by how they predict left-out measurements.",
             "inaccurate-integral",
         ),
     )
