@@ -13,7 +13,7 @@ from scipy.stats import norm, truncnorm
 
 import tissuq as tq
 from tissuq.assessment.uses import Use, Verdict
-from tissuq.population.uses import NOT_PREDICTED, PREDICTING
+from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report import population
 from tissuq.report.population import _next_step
@@ -443,7 +443,7 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     population = SimpleNamespace(
         posteriors=fits, converged=True, symbols=("C10",), coordinates=SimpleNamespace(is_log=[True]),
         summary=lambda: {"median": {("C10", "spread"): 0.3}},
-        complete=SimpleNamespace(model=SimpleNamespace(discrepancy=SimpleNamespace(is_best_fit=False))),
+        complete=SimpleNamespace(model=SimpleNamespace(discrepancy=SimpleNamespace(is_best_fit=False, parameters=()))),
     )  # fmt: skip
     assert list(far_specimens(population)) == ["soft"]
     (warning,) = _far_specimens(population)
@@ -463,6 +463,9 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert "finite elements" in _next_step(population, [], uses=not_predicted)
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
     assert _next_step(population, [at_rest], uses=useless).startswith("take off what the load cell shows at rest")
+    apart, departing = ([Use(PREDICTING, Verdict.NO, reason)] for reason in (CONTRADICTING, DEPARTING))
+    assert _next_step(population, [], uses=apart).startswith("find out why the tests of a specimen contradict")
+    assert _next_step(population, [], uses=departing).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = True
     assert _next_step(population, [], uses=useless).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = False

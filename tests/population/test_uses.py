@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.assessment.uses import Verdict
-from tissuq.population.uses import uses_of_population
+from tissuq.population.uses import CONTRADICTING, DEPARTING, uses_of_population
 from tissuq.prediction.bands import Band
 from tissuq.result_warning import ResultWarning
 
@@ -73,6 +73,30 @@ def test_what_is_wrong_with_measurements_stands_against_both(alike, code):
 
 def test_what_is_not_predicted_is_not_used(alike):
     assert uses_of_population(alike, [], ())[1].verdict is Verdict.NO
+
+
+def test_a_population_is_of_no_use_where_the_fits_of_most_specimens_are_of_none(alike, monkeypatch):
+    codes = dict.fromkeys(alike.posteriors, "unmodelled-curve")
+
+    def warnings_about(solution, *_):
+        return [ResultWarning("x", next(codes[name] for name in codes if alike.posteriors[name].solution is solution))]
+
+    monkeypatch.setattr("tissuq.population.uses.warnings_about", warnings_about)
+    assert {use.reason for use in uses_of_population(alike, [band(0.1)], ())} == {DEPARTING}
+    codes |= dict.fromkeys(list(codes)[:4], "tests-apart")
+    assert {use.reason for use in uses_of_population(alike, [band(0.1)], ())} == {CONTRADICTING}
+    codes |= dict.fromkeys(list(codes)[:3], "poorly-determined")  # of six
+    assert all(use.verdict is Verdict.CARE for use in uses_of_population(alike, [band(0.1)], ()))
+
+
+def test_curves_that_a_law_cannot_follow_stand_against_both():
+    stretch = np.linspace(1.02, 1.5, 25)
+    tests = {
+        f"s{place}": tq.simulate("ogden-1", {"mu1": mu, "alpha1": 12.0}, stretch, noise_sd=0.002, seed=place)
+        for place, mu in enumerate([0.1, 0.11, 0.12, 0.1, 0.09])
+    }
+    uses = uses_of_population(tq.fit_population(tests, discrepancy="none"), [band(0.1)], ())
+    assert [(use.verdict, use.reason) for use in uses] == [(Verdict.NO, DEPARTING)] * 2
 
 
 def test_few_specimens_say_little_of_a_new_one_and_one_in_another_unit_of_none():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,13 +12,16 @@ from tissuq.assessment.uses import PRECISE, Use, Verdict, precision_of, relative
 from tissuq.population.picture import numbers_of
 from tissuq.population.population import Population
 from tissuq.population.warnings import far_specimens, has_few_specimens
+from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import Band
 from tissuq.result_warning import has_code
 
-__all__ = ["NOT_PREDICTED", "PREDICTING", "uses_of_population"]
+__all__ = ["CONTRADICTING", "DEPARTING", "NOT_PREDICTED", "PREDICTING", "uses_of_population"]
 
 PREDICTING = "predict a new specimen"
 NOT_PREDICTED = "its stress is not predicted in the modes that were measured"
+CONTRADICTING = "the tests of most specimens contradict each other, so that moduli may be those of none of them"
+DEPARTING = "the fitted curves of most specimens depart from the measured ones, and the intervals do not include that"
 
 
 def uses_of_population(
@@ -56,7 +60,20 @@ def _reason_against(population: Population, warnings: Sequence[str]) -> str:
             population.complete.model.discrepancy.is_best_fit
         ),
     }
-    return next((reason for reason, applies in reasons.items() if applies), "")
+    found = next((reason for reason, applies in reasons.items() if applies), "")
+    return found or _against_most_fits(population)
+
+
+def _against_most_fits(population: Population) -> str:
+    """Return what stands against any use of the separate fits of more than half of the specimens."""
+    fits = population.posteriors.values()
+    counts = Counter(
+        code
+        for fit in fits
+        for code in {warning.code for warning in warnings_about(fit.solution, {}, np.concatenate(fit.inside_bands()))}
+    )
+    reasons = {"tests-apart": CONTRADICTING, "unmodelled-curve": DEPARTING}
+    return next((reason for code, reason in reasons.items() if 2 * counts[code] > len(fits)), "")
 
 
 def _reporting(population: Population) -> tuple[Verdict, str]:

@@ -14,7 +14,7 @@ from tissuq.assessment.uses import PRECISE, Use, Verdict
 from tissuq.errors import TissuqError
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import NOT_PREDICTED, PREDICTING, uses_of_population
+from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING, uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -173,6 +173,13 @@ def _next_step(
         return "take off what the load cell shows at rest, as the warning about it says, and fit again"
     if population.complete.model.discrepancy.is_best_fit:
         return "let the data decide how wrong the material is: fit again with --discrepancy auto"
+    reasons = {use.reason for use in uses}
+    if CONTRADICTING in reasons:
+        return "find out why the tests of a specimen contradict each other: tissuq fit of one says which, and how much"
+    if DEPARTING in reasons:
+        if not population.complete.model.discrepancy.parameters:
+            return "let the data decide how wrong the material is: fit again with --discrepancy auto"
+        return "see what the fits do not follow: tissuq fit of one specimen says what to do about it"
     spread = float(population.summary()["median"][population.symbols[0], "spread"])
     if population.coordinates.is_log[0] and spread > WIDE_SPREAD:
         return (
