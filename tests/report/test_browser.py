@@ -237,6 +237,31 @@ def test_the_page_of_any_command_has_verdicts_before_the_picture_on_a_small_scre
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
+def test_two_verdicts_stand_before_the_finding_and_numbers_are_in_one_piece(tmp_path):
+    result = Result(
+        command="population",
+        title="A population",
+        subject="two specimens",
+        numbers=(
+            Number("a", 1.0),
+            Number("initial shear modulus, of a population", 6.08e-05, 4.99e-05, 7.15e-05, "MPa"),
+        ),
+        finding="A sentence of some length about the numbers. " * 8,
+        uses=(Use("report it", Verdict.YES, "known"), Use("a purpose of a rather long name", Verdict.NO, "not known")),
+        next_step="fit another law",
+        picture=Picture("answer", small_figure, "a line that rises", "A line."),
+    )
+    write_result(result, tmp_path)
+    for width in (1200, 400, 380, 360, 340):
+        with opened(tmp_path / "report.html", width) as page:
+            parts = (".numbers", ".uses li", ".uses .next", ".finding")
+            tops = [page.locator(part).first.bounding_box()["y"] for part in parts]
+            assert tops == sorted(tops)
+            for part in (".numbers strong >> nth=1", ".uses li strong >> nth=1"):
+                assert page.locator(part).evaluate("part => part.getClientRects().length") == 1
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
 def test_the_names_of_rows_stay_in_view_where_a_table_is_moved(tmp_path):
     rows = [[name, *["0.123 ± 0.001"] * 6] for name in ("neo-hookean", "veronda-westmann")]
     table = Table(["law", *"abcdef"], rows, "Laws")

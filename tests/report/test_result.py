@@ -56,6 +56,8 @@ def result_of(**changes):
         (Number("x", 81.34, 79.02, 83.71, "kPa"), "81.3 kPa", "95 % interval 79.0 to 83.7"),
         (Number("x", 0.5), "0.5", ""),
         (Number("x", "planar", remark="by far"), "planar", "by far"),
+        (Number("x", 6.1e-05, 2.3e-05, 1.1e-04, "MPa"), "0.000061 MPa", "95 % interval 0.000023 to 0.000110"),
+        (Number("x", 6.1e-05, 5.0e-05, 7.1e-05, "MPa"), "6.10e-05 MPa", "95 % interval 5.00e-05 to 7.10e-05"),
         (Number("x", 1.0, 1.0, 1.0, "MPa", "95 % band"), "1 MPa", "95 % band 1 to 1"),
         (Number("x", 404.0, 15.0, 3e21, "kPa"), "404 kPa", "95 % interval 15 to 3e+21"),
         (Number("x", 404.0, 15.0, inf, "kPa"), "404 kPa", "95 % interval 15 to inf"),
@@ -211,6 +213,25 @@ def test_the_terminal_calls_a_note_a_note(capsys):
     out = capsys.readouterr().out
     assert "Warning: warning 0" in out
     assert "Note: warning 1" in out
+
+
+def test_long_numbers_are_wrapped_in_the_terminal(capsys):
+    print_result(result_of(numbers=(Number("the best", "a test of a long name " * 8),)).record())
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 96
+    first = next(number for number, line in enumerate(lines) if "the best" in line)
+    assert lines[first + 1].startswith(" " * len("  the best  ") + "name a test")
+
+
+def test_an_interval_is_in_one_line_in_the_terminal(capsys):
+    print_result(result_of(numbers=(Number("the modulus " * 4, 6.1e-05, 2.3e-05, 1.1e-04, "MPa"),)).record())
+    assert [line.strip() for line in capsys.readouterr().out.splitlines()][3] == "95 % interval 0.000023 to 0.000110"
+
+
+def test_exponents_stay_in_one_piece_on_a_page(tmp_path):
+    write_result(result_of(finding="1.4e-05 to 8.6e-05 MPa, not phase-2"), tmp_path, figures=False)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<span class=option>1.4e-05</span> to <span class=option>8.6e-05</span> MPa, not phase-2" in page
 
 
 def test_options_in_warnings_stay_in_one_piece_on_a_page(tmp_path):

@@ -7,7 +7,7 @@ import tissuq as tq
 from tissuq.experiments.units import StressUnit
 from tissuq.report.measured import named
 from tissuq.report.summary import stability_section, summary_table
-from tissuq.report.tables import interval, significant, write_csv, write_json
+from tissuq.report.tables import interval, significant, stretch_in_words, write_csv, write_json
 
 ROW = {
     "formulation": "none",
@@ -104,3 +104,8 @@ def test_a_title_names_the_test_and_its_specimen():
     assert named(second) == "pig 3 shear"
     assert named(tq.Experiment.of([first, second])) == "tension + pig 3 shear"
     assert named(tq.Experiment.of([first, third])) == "2 tests"
+
+
+def test_a_stretch_and_its_interval_have_the_same_digits():
+    assert stretch_in_words(1.94, 1.9, 2.0) == "1.94 [1.90, 2.00]"
+    assert stretch_in_words(None, None, None) == ""

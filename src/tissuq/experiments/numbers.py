@@ -40,14 +40,16 @@ PRODUCT = re.compile(rf"{SIDE}(?:{CROSS}{SIDE})+")
 
 
 def unbroken(text: str) -> str:
-    r"""Return a text in which no line ends between a number and its %.
+    r"""Return a text in which no line ends between a number and its % or its ±.
 
     Examples
     --------
     >>> unbroken("a 95 % interval, stress=10%")
     'a 95\xa0% interval, stress=10%'
+    >>> unbroken("± 5 %")
+    '±\xa05\xa0%'
     """
-    return BEFORE_PERCENT.sub("\u00a0", text)
+    return BEFORE_PERCENT.sub("\u00a0", text).replace("± ", "±\u00a0")
 
 
 def wrapped(text: str, width: int, **indents: Any) -> str:

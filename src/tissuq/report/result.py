@@ -150,8 +150,9 @@ class Number:
             return self.value
         if isnan(self.value):
             return "not known"
-        spread = self._spread
-        rounded = interval(self.value, self.value, spread)[0] if spread else significant(self.value)
+        spread, ends = self._spread, (self.value, self.low or 0.0, self.high or 0.0)
+        largest = max(ends, key=abs)  # value and interval are written alike
+        rounded = interval(self.value, largest, spread)[0] if spread else significant(self.value)
         return f"{rounded} {self.unit}".strip()
 
     @property

@@ -224,11 +224,11 @@ def _in_one_piece(value: Any) -> Any:
 
 
 def _prose(text: str) -> Markup:
-    """Return a text as HTML: ``**strong**``, `` `code` ``, options in one piece; everything else in it is escaped."""
+    """Return a text as HTML: ``**strong**``, `` `code` ``, options and exponents in one piece; all else is escaped."""
     from markupsafe import Markup, escape
 
     marked = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", str(escape(unbroken(text))))
-    marked = re.sub(r"(?<![\w-])(--[a-z][a-z-]+[a-z])", r"<span class=option>\1</span>", marked)
+    marked = re.sub(r"(?<![\w-])(--[a-z][a-z-]+[a-z]|\d[\d.]*e-\d+)", r"<span class=option>\1</span>", marked)
     return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", marked))  # noqa: S704 (escaped above)
 
 

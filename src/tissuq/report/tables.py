@@ -109,4 +109,4 @@ def percent(probability: float | None) -> str:
 
 def stretch_in_words(median: float | None, low: float | None, high: float | None) -> str:
     """Return a stretch with its interval."""
-    return "" if median is None else f"{median:.3g} [{low:.3g}, {high:.3g}]"
+    return "" if median is None else f"{median:#.3g} [{low:#.3g}, {high:#.3g}]"
