@@ -93,6 +93,8 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
     assert 0.66 < high < 1
     assert {text.get_text() for text in axis.texts} == {"30 [27, 33]", "a new specimen: from 0.1 to 9"}
     complete = [line for line in axis.lines if line.get_marker() == "D"]
+    level = next(text.get_position()[1] for text in axis.texts if text.get_text().startswith("a new specimen"))
+    assert axis.get_ylim()[0] < level < complete[0].get_ydata().item()  # beneath it, not on it
     assert [line.get_xdata().item() for line in complete] == [0.5]  # seen however narrow its interval
     plt.close("all")
 

@@ -469,8 +469,18 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     population.complete.model.discrepancy.is_best_fit = True
     assert _next_step(population, [], uses=useless).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = False
+    assert _next_step(population, [], share=0.3, uses=useless).startswith("fit another law")
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
     assert _next_step(population, []).startswith("find out why the specimens differ so much")
+
+
+def test_the_modulus_of_a_law_that_is_wrong_is_that_at_rest_where_the_law_carries_it(monkeypatch):
+    def said(initial, share=0.9, words="initial shear modulus"):
+        monkeypatch.setattr(population, "share_of_initial_stiffness", lambda _: initial)
+        return population._about_modulus(None, share, words)
+
+    assert said(0.03) == " The modulus is that at rest, of which the discrepancy carries 3 %."
+    assert said(0.03, share=0.1) == said(0.03, words="C10") == said(0.3) == said(float("nan")) == ""
 
 
 def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_that_is_known(monkeypatch):

@@ -9,7 +9,7 @@ import tissuq as tq
 from tissuq.assessment.uses import Verdict
 from tissuq.population.uses import CONTRADICTING, DEPARTING, uses_of_population
 from tissuq.prediction.bands import Band
-from tissuq.result_warning import ResultWarning
+from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
 MODULI = [0.42, 0.46, 0.5, 0.54, 0.48, 0.52]
@@ -69,6 +69,18 @@ def test_with_a_discrepancy_both_can_be_yes(monkeypatch):
 def test_what_is_wrong_with_measurements_stands_against_both(alike, code):
     uses = uses_of_population(alike, [band(0.1)], (ResultWarning("x", code),))
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
+
+
+@pytest.mark.parametrize(("severity", "is_doubted"), [(Severity.CAUTION, True), (Severity.NOTE, False)])
+def test_doubtful_measurements_of_a_specimen_call_for_care(monkeypatch, severity, is_doubted):
+    monkeypatch.setattr("tissuq.population.uses._reporting", lambda _: (Verdict.YES, "known"))
+    monkeypatch.setattr("tissuq.population.uses._predicting", lambda *_: (Verdict.NO, "not known"))
+    monkeypatch.setattr("tissuq.population.uses._reason_against", lambda *_: "")
+    slipped = ResultWarning("s1: it slipped.", severity=severity)
+    reporting, predicting = uses_of_population(None, [], ("a sentence", slipped))
+    assert (reporting.verdict, predicting.verdict) == (Verdict.CARE if is_doubted else Verdict.YES, Verdict.NO)
+    for use in (reporting, predicting):
+        assert use.reason.endswith("; see the warning about the measurements") is is_doubted
 
 
 def test_what_is_not_predicted_is_not_used(alike):

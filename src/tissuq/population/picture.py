@@ -56,18 +56,23 @@ def draw_specimens(
         panel.plot([float(np.mean(complete))], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
         _draw_specimens(panel, estimates, small)
         _set_axis(panel, estimates, np.array([*new, *median, *complete]))
-        _say_what_is_outside(panel, estimates, new)
+        bottom = _say_what_is_outside(panel, estimates, new, height_of_row(small))
         panel.set_xlabel(f"{symbol} [{unit}]" if unit else symbol)
         labels = order if number % drawn.columns == 0 else [""] * len(order)
         panel.set_yticks(range(len(order)), labels, fontsize=(6.5 if small else 9) * size)
         panel.tick_params(axis="y", length=0)
-        panel.set_ylim(-0.8, len(order) - 0.2)
+        panel.set_ylim(bottom, len(order) - 0.2)
     drawn.explain(2)
 
 
 def height_of(count: int, letters: float = 1.0) -> float:
     """Return the height of a panel of so many specimens, inches, for letters of a size over the usual one."""
-    return letters * (1.2 + (0.15 if count > SMALL_MARKS_ABOVE else 0.27) * count)
+    return letters * (1.2 + height_of_row(count > SMALL_MARKS_ABOVE) * count)
+
+
+def height_of_row(small: bool) -> float:
+    """Return the height of a specimen in a panel, inches."""
+    return 0.15 if small else 0.27
 
 
 def numbers_of(table: pd.DataFrame) -> dict[Any, dict[str, float]]:
@@ -100,8 +105,12 @@ def _limits(estimates: Mapping[str, FloatArray], bands: FloatArray) -> tuple[flo
     return limits_of([estimates["median"][near]], [*ends, bands], margin=1.0)
 
 
-def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float]) -> None:
-    """Mark specimens whose median lies beyond the axis, and say where; and how far the range of new ones goes on."""
+def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float], row: float) -> float:
+    """Mark specimens whose median lies beyond the axis, and say where; and how far the range of new ones goes on.
+
+    Return where the panel ends: beneath complete pooling, and what is said beneath that. ``row`` is the height of a
+    specimen, inches.
+    """
     low, high = axis.get_xlim()
     looks: dict[str, Any] = {"transform": axis.get_yaxis_transform(), "color": INK}
     words: dict[str, Any] = looks | {"fontsize": "small", "va": "center"}
@@ -114,8 +123,11 @@ def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: l
             axis.text(position + inward, level, f"{median:.3g} [{start:.3g}, {end:.3g}]", ha=side, **words)
     cut_ends = [f"{word} {end:.3g}" for word, end, is_beyond in zip(
         ("from", "to"), new, (new[0] < low, new[1] > high), strict=True) if is_beyond]  # fmt: skip
-    if cut_ends:
-        axis.text(0.985, -0.55, f"a new specimen: {' '.join(cut_ends)}", ha="right", **words)
+    if not cut_ends:
+        return -0.8
+    beneath = -0.55 - 0.13 / row
+    axis.text(0.985, beneath, f"a new specimen: {' '.join(cut_ends)}", ha="right", **words)
+    return beneath - 0.09 / row
 
 
 def _draw_specimens(axis: Axes, estimates: Mapping[str, FloatArray], small: bool) -> None:

@@ -14,9 +14,16 @@ from tissuq.population.population import Population
 from tissuq.population.warnings import far_specimens, has_few_specimens
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import Band
-from tissuq.result_warning import has_code
+from tissuq.result_warning import Severity, has_code
 
-__all__ = ["CONTRADICTING", "DEPARTING", "NOT_PREDICTED", "PREDICTING", "uses_of_population"]
+__all__ = [
+    "CONTRADICTING",
+    "DEPARTING",
+    "NOT_PREDICTED",
+    "PREDICTING",
+    "share_of_initial_stiffness",
+    "uses_of_population",
+]
 
 PREDICTING = "predict a new specimen"
 NOT_PREDICTED = "its stress is not predicted in the modes that were measured"
@@ -40,10 +47,20 @@ def uses_of_population(
         What the first pooled parameter is, or stands for.
     """
     against = _reason_against(population, warnings)
-    return (
-        Use(f"report the {quantity} of the tissue", *((Verdict.NO, against) if against else _reporting(population))),
-        Use(PREDICTING, *((Verdict.NO, against) if against else _predicting(population, bands))),
+    purposes = (f"report the {quantity} of the tissue", PREDICTING)
+    if against:
+        return tuple(Use(purpose, Verdict.NO, against) for purpose in purposes)
+    judged = (_reporting(population), _predicting(population, bands))
+    return tuple(
+        Use(purpose, *_beside_measurements(warnings, *verdict))
+        for purpose, verdict in zip(purposes, judged, strict=True)
     )
+
+
+def share_of_initial_stiffness(population: Population) -> float:
+    """Return the share of the initial stiffness that the discrepancy carries: the median of the specimens."""
+    shares = [abs(shares_of_discrepancy(fit.solution)[1][0]) for fit in population.posteriors.values()]
+    return float(np.median(shares))
 
 
 def _reason_against(population: Population, warnings: Sequence[str]) -> str:
@@ -78,8 +95,7 @@ def _against_most_fits(population: Population) -> str:
 
 def _reporting(population: Population) -> tuple[Verdict, str]:
     """Return whether the median of the population can be reported."""
-    shares = [abs(shares_of_discrepancy(fit.solution)[1][0]) for fit in population.posteriors.values()]
-    carried = float(np.median(shares))
+    carried = share_of_initial_stiffness(population)
     if carried > PRECISE:
         of_stiffness = f"{100 * carried:.0f} % of the initial stiffness (median of the specimens)"
         return Verdict.NO, f"the discrepancy carries {of_stiffness}, by which it may be off"
@@ -101,6 +117,13 @@ def _predicting(population: Population, bands: Sequence[Band]) -> tuple[Verdict,
         few = f"which {len(population.names)} specimens determine no better than its prior"
         return worst_of(verdict, Verdict.CARE), f"{sentence}, {few}"
     return _beside_law(population, verdict, sentence)
+
+
+def _beside_measurements(warnings: Sequence[str], verdict: Verdict, sentence: str) -> tuple[Verdict, str]:
+    """Return a verdict with the doubt that warnings about the measurements of specimens, notes aside, leave."""
+    if any(has_code([w], "measurements") and getattr(w, "severity", None) is not Severity.NOTE for w in warnings):
+        return worst_of(verdict, Verdict.CARE), f"{sentence}; see the warning about the measurements"
+    return verdict, sentence
 
 
 def _beside_law(population: Population, verdict: Verdict, sentence: str) -> tuple[Verdict, str]:

@@ -14,7 +14,14 @@ from tissuq.assessment.uses import PRECISE, Use, Verdict
 from tissuq.errors import TissuqError
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING, uses_of_population
+from tissuq.population.uses import (
+    CONTRADICTING,
+    DEPARTING,
+    NOT_PREDICTED,
+    PREDICTING,
+    share_of_initial_stiffness,
+    uses_of_population,
+)
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -127,7 +134,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
-        finding=_lead(study) + _about_law(population, share),
+        finding=_lead(study) + _about_law(population, share) + _about_modulus(population, share, words),
         uses=uses,
         next_step=_next_step(population, study.warnings, share, settings.without, uses, has_aim=needed is not None),
         picture=Picture(
@@ -186,20 +193,21 @@ def _next_step(
             "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
             "compute with a new one"
         )
-    against = [use.reason for use in uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
-    is_too_wide = any(reason != NOT_PREDICTED for reason in against)
-    if is_too_wide and not has_aim:
-        return (
-            "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
-            "sets them apart (--covariates)"
-        )
     if share > PRECISE:
         return (
             "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
             "out; tissuq fit FILE --material all of one specimen says which"
         )
-    if is_too_wide:
-        return "find out what sets the specimens apart (--covariates); how many it takes stands beneath the parameters"
+    against = [use.reason for use in uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
+    if any(reason != NOT_PREDICTED for reason in against):
+        if has_aim:
+            return (
+                "find out what sets the specimens apart (--covariates); how many it takes stands beneath the parameters"
+            )
+        return (
+            "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
+            "sets them apart (--covariates)"
+        )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
 
@@ -415,7 +423,8 @@ def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -
     """Return a median and an interval with the decimals that its width supports."""
     low, middle, high = (numbers[f"{prefix}{name}"] / factor for name in ("hdi_low", "median", "hdi_high"))
     width = (high - low) / 4
-    return interval(middle, middle, width)[0], "[{}, {}]".format(*interval(low, high, width))
+    largest = max(low, middle, high, key=abs)
+    return interval(middle, largest, width)[0], "[{}, {}]".format(*interval(low, high, width))
 
 
 def _lead(study: PopulationStudy) -> str:
@@ -449,6 +458,14 @@ def _about_law(population: Population, share: float) -> str:
         f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress (median of the "
         f"specimens), and cards of a new specimen are of {law} alone."
     )
+
+
+def _about_modulus(population: Population, share: float, words: str) -> str:
+    """Return why the modulus of a law that is wrong can be right, as a sentence after others."""
+    initial = share_of_initial_stiffness(population)
+    if words != MODULUS or not initial <= PRECISE < share:
+        return ""
+    return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
 
 
 def _share_of_discrepancy(population: Population, warnings: Sequence[str]) -> float:
