@@ -16,7 +16,7 @@ from tissuq.assessment.uses import Use, Verdict
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report import population
-from tissuq.report.population import _next_step
+from tissuq.report.population_next_step import next_step_of
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
@@ -449,29 +449,29 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     (warning,) = _far_specimens(population)
     assert warning.severity == Severity.PROBLEM
     assert "the initial modulus of soft is 0.0053 times that of the other specimens" in warning
-    assert _next_step(population, []).startswith("look at soft first")
+    assert next_step_of(population, []).startswith("look at soft first")
     without_unit = ResultWarning("the unit of the stress is not stated.", "doubtful-reading", Severity.PROBLEM)
-    assert _next_step(population, [without_unit]).startswith("say what the files do not")
+    assert next_step_of(population, [without_unit]).startswith("say what the files do not")
     population.posteriors.pop("soft")
-    assert "finite elements" in _next_step(population, [], share=0.2)
-    assert _next_step(population, [], share=0.3).startswith("fit another law (--material) before you compute")
+    assert "finite elements" in next_step_of(population, [], share=0.2)
+    assert next_step_of(population, [], share=0.3).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
-    assert "--aim 20%" in _next_step(population, [], uses=useless)
-    assert _next_step(population, [], uses=useless, has_aim=True).startswith("find out what sets the specimens apart")
-    assert _next_step(population, [], share=0.3, uses=useless, has_aim=True).startswith("fit another law")
+    assert "--aim 20%" in next_step_of(population, [], uses=useless)
+    assert next_step_of(population, [], uses=useless, has_aim=True).startswith("find out what sets the specimens apart")
+    assert next_step_of(population, [], share=0.3, uses=useless, has_aim=True).startswith("fit another law")
     not_predicted = [Use(PREDICTING, Verdict.NO, NOT_PREDICTED)]
-    assert "finite elements" in _next_step(population, [], uses=not_predicted)
+    assert "finite elements" in next_step_of(population, [], uses=not_predicted)
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
-    assert _next_step(population, [at_rest], uses=useless).startswith("take off what the load cell shows at rest")
+    assert next_step_of(population, [at_rest], uses=useless).startswith("take off what the load cell shows at rest")
     apart, departing = ([Use(PREDICTING, Verdict.NO, reason)] for reason in (CONTRADICTING, DEPARTING))
-    assert _next_step(population, [], uses=apart).startswith("find out why the tests of a specimen contradict")
-    assert _next_step(population, [], uses=departing).endswith("--discrepancy auto")
+    assert next_step_of(population, [], uses=apart).startswith("find out why the tests of a specimen contradict")
+    assert next_step_of(population, [], uses=departing).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = True
-    assert _next_step(population, [], uses=useless).endswith("--discrepancy auto")
+    assert next_step_of(population, [], uses=useless).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = False
-    assert _next_step(population, [], share=0.3, uses=useless).startswith("fit another law")
+    assert next_step_of(population, [], share=0.3, uses=useless).startswith("fit another law")
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
-    assert _next_step(population, []).startswith("find out why the specimens differ so much")
+    assert next_step_of(population, []).startswith("find out why the specimens differ so much")
 
 
 def test_the_modulus_of_a_law_that_is_wrong_is_that_at_rest_where_the_law_carries_it(monkeypatch):

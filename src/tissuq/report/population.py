@@ -10,18 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.assessment.extent import has_energy, shares_of_discrepancy
-from tissuq.assessment.uses import PRECISE, Use, Verdict
+from tissuq.assessment.uses import PRECISE
 from tissuq.errors import TissuqError
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import (
-    CONTRADICTING,
-    DEPARTING,
-    NOT_PREDICTED,
-    PREDICTING,
-    share_of_initial_stiffness,
-    uses_of_population,
-)
+from tissuq.population.uses import share_of_initial_stiffness, uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -34,6 +27,7 @@ from tissuq.report.population_figures import (
     patient_figure,
     specimens_figure,
 )
+from tissuq.report.population_next_step import next_step_of
 from tissuq.report.population_tables import (
     effects_of_covariates,
     needed_of,
@@ -90,8 +84,6 @@ HOW_TO_READ = (
 )
 POINTS = 81
 """Of the stress of a new specimen."""
-WIDE_SPREAD = 1.0
-"""Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
 QUANTITIES = {
     "median": "median of the population",
     "spread": "spread between specimens",
@@ -136,7 +128,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         numbers=_numbers(study),
         finding=_lead(study) + _about_law(population, share) + _about_modulus(population, share, words),
         uses=uses,
-        next_step=_next_step(population, study.warnings, share, settings.without, uses, has_aim=needed is not None),
+        next_step=next_step_of(
+            population, study.warnings, share, settings.without, uses, has_aim=needed is not None
+        ),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
@@ -151,64 +145,6 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         files=files | copies.files | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
-
-
-def _next_step(
-    population: Population,
-    warnings: Sequence[str],
-    share: float = 0.0,
-    already_without: Sequence[str] = (),
-    uses: Sequence[Use] = (),
-    *,
-    has_aim: bool = False,
-) -> str:
-    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
-
-    ``share`` is that of the stress which the discrepancy carries; with an aim, the page has the number that it takes.
-    """
-    if not population.converged:
-        return "sample again, with another --seed; see the first warning"
-    if has_code(warnings, "doubtful-reading"):
-        return "say what the files do not, as the warning about what was read asks, and fit again"
-    if far := list(far_specimens(population)):
-        options = " ".join(f"--without {name}" for name in (*already_without, *far))
-        return (
-            f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
-            f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
-        )
-    if has_code(warnings, "stress-at-rest"):
-        return "take off what the load cell shows at rest, as the warning about it says, and fit again"
-    if population.complete.model.discrepancy.is_best_fit:
-        return "let the data decide how wrong the material is: fit again with --discrepancy auto"
-    reasons = {use.reason for use in uses}
-    if CONTRADICTING in reasons:
-        return "find out why the tests of a specimen contradict each other: tissuq fit of one says which, and how much"
-    if DEPARTING in reasons:
-        if not population.complete.model.discrepancy.parameters:
-            return "let the data decide how wrong the material is: fit again with --discrepancy auto"
-        return "see what the fits do not follow: tissuq fit of one specimen says what to do about it"
-    spread = float(population.summary()["median"][population.symbols[0], "spread"])
-    if population.coordinates.is_log[0] and spread > WIDE_SPREAD:
-        return (
-            "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
-            "compute with a new one"
-        )
-    if share > PRECISE:
-        return (
-            "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
-            "out; tissuq fit FILE --material all of one specimen says which"
-        )
-    against = [use.reason for use in uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
-    if any(reason != NOT_PREDICTED for reason in against):
-        if has_aim:
-            return (
-                "find out what sets the specimens apart (--covariates); how many it takes stands beneath the parameters"
-            )
-        return (
-            "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
-            "sets them apart (--covariates)"
-        )
-    return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
 
 def _note(population: Population) -> str:
