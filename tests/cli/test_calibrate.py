@@ -259,6 +259,10 @@ def test_several_specimens_are_refused_until_one_is_read(tmp_path):
     with (tmp_path / "run" / "prediction.csv").open(newline="") as lines:
         measured = [float(row["measured"]) for row in csv.DictReader(lines)]
     assert measured == [float(row.split(",")[1]) for row in others]
+    by_sensor = (tmp_path / "both.csv").read_text().replace("specimen", "sensor")
+    (tmp_path / "both.csv").write_text(by_sensor)  # of which a forward model may know that they are of one test
+    said = run_in(tmp_path, *arguments[:-6], "--out", "sensors", "--control", "depth", "--measured", "force")
+    assert said.status == 0, said.err
 
 
 TENSION = """

@@ -19,9 +19,8 @@ from tissuq.emulation.problem import symbol_of
 from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import FOUR_DIGITS, agree
 from tissuq.experiments.reading.column_units import declared_unit
-from tissuq.experiments.reading.headings import heading, plain
-from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, check_one_specimen, only_rows
+from tissuq.experiments.reading.headings import heading, is_of_specimens, plain
+from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, only_rows, row_names
 from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.units import PRESSURE, measured_in, stress_unit
@@ -296,19 +295,21 @@ def _control(table: Table, measured: Sequence[int], requested: str | int | None)
 
 def _measured(table: Table, columns: tuple[int, int], stride: int) -> Measured:
     control, measured = (column[::stride] for column in table.numbers(columns))
-    _check_one_specimen(table, columns)
+    _check_one_specimen(table)
     control_label, measured_label = (_label(table, index) for index in columns)
     units = declared_unit(table, columns[0]), declared_unit(table, columns[1])
     return Measured(control, measured, control_label, measured_label, units)
 
 
-def _check_one_specimen(table: Table, columns: tuple[int, int]) -> None:
-    """Refuse rows of several specimens, as a fit does: their parameters would be taken for the same."""
-    (control,) = table.numbers(columns[:1])
-    try:
-        check_one_specimen(table, [ColumnChoice(*columns)], control)
-    except SeveralSpecimens as several:
-        raise SeveralSpecimens(several.place, several.column, several.labels) from several
+def _check_one_specimen(table: Table) -> None:
+    """Refuse rows of several specimens, as a fit does: their parameters would be taken for the same.
+
+    What another column tells apart, such as the sensors of one test, a forward model may know.
+    """
+    for column in filter(lambda number: is_of_specimens(table.quantities[number]), range(len(table.names))):
+        labels = row_names(table, column)
+        if len({*labels}) > 1:
+            raise SeveralSpecimens(table.place(column), table.key(column), labels)
 
 
 def _places(table: Table, requested: Sequence[str | int | None]) -> tuple[int, int]:
