@@ -247,8 +247,7 @@ def _open(folder: Path, model: Forward, problem: Problem) -> None:
         different = [name for name, value in about.items() if recorded.get(name) != value]
         if not different:
             return
-        results = [result for path in folder.glob(f"batch-*/{RESULTS}") for result in read_results(path).values()]
-        if not (results and all(map(_has_failed, results))):
+        if not _have_all_failed(folder):
             raise InputError(
                 f"folder '{folder}' holds runs of another forward model or data (its {different[0]} differ): choose "
                 "another one, or remove it."
