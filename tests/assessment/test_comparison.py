@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 import gallery
 import tissuq as tq
-from tissuq.assessment.comparison import warnings_of_evidence
+from tissuq.assessment.evidence import warnings_of_evidence
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.moments import stress_moments
 from tissuq.report.comparison import comparison_warnings

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.extent import has_energy, shares_of_discrepancy
+from tissuq.assessment.extent import has_energy
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.next_step import Step, next_step
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.sheet import SheetStresses, sheet_stresses
 from tissuq.assessment.stability import StableRange
 from tissuq.assessment.uses import PRECISE, Use, uses_of

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,29 +19,22 @@ from tissuq.assessment.sensitivity import (
     rescaled,
     scale_symbols,
 )
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.experiments.modes import States
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.enumerators.noise_grid import at_level
 from tissuq.inference.marginal import Marginal
-from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import FittedErrors
-from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["Assessment", "assess", "has_energy", "shares_of_discrepancy"]
+__all__ = ["Assessment", "assess", "has_energy"]
 
 FloatArray = NDArray[np.float64]
 Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
 
-SHARE_DRAWS = 2000
-MAX_SHARE_POINTS = 60
-"""Largest number of measured stretches over which the share is averaged."""
-STRETCH_STEP = 1e-4
-"""Step of the stretch for the initial slope."""
 NEGLIGIBLE_INITIAL_SHARE = 1e-3
 """Largest share of the initial stiffness that counts as none."""
 MIN_NOTICEABLE_SHIFT, MIN_IMPORTANT_SHIFT = 0.2, 0.5
@@ -326,48 +318,6 @@ def _evidence_changes(solution: Solution, rescaled_solutions: Mapping[str, Solut
     }
     log_evidence = solution.log_evidence
     return {} if log_evidence is None else {name: float(value - log_evidence) for name, value in evidences.items()}
-
-
-@lru_cache(maxsize=8)
-def shares_of_discrepancy(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals.
-
-    Remembered, as the answer and the assessment ask for them.
-    """
-    experiment, components = solution.model.experiment, solution.mixture
-    mode = experiment.curves[0].mode
-    reference = experiment.states_at(mode.excursion([-STRETCH_STEP, STRETCH_STEP]), mode)
-    states = States.joined([_even(experiment.states), reference])
-    material_stress, discrepancy_stress = drawn_curves(
-        solution.model, components[systematic(components.weights[None], SHARE_DRAWS)[0]], states
-    )
-    size = np.sqrt(
-        (discrepancy_stress[:, :-2] ** 2).mean(axis=1)
-        / ((material_stress + discrepancy_stress)[:, :-2] ** 2).mean(axis=1)
-    )
-    slope, material_slope = (curve[:, -1] - curve[:, -2] for curve in (discrepancy_stress, material_stress))
-    return _mean_and_ends(size), _mean_and_ends(slope / (slope + material_slope))
-
-
-def _even(states: States) -> States:
-    """Return few states that stand for all different ones."""
-    different = []
-    for path, points in zip(states.paths, states.points, strict=True):
-        unique = np.unique(points, axis=0)
-        different.append(unique[np.argsort(path.abscissa(unique), kind="stable")])
-    ends = np.cumsum([len(points) for points in different])
-    indices = np.linspace(0, ends[-1] - 1, min(int(ends[-1]), MAX_SHARE_POINTS)).astype(int)
-    starts = ends - [len(points) for points in different]
-    points = [
-        unique[indices[(start <= indices) & (indices < end)] - start]
-        for unique, start, end in zip(different, starts, ends, strict=True)
-    ]
-    return States(states.paths, tuple(points), states.curves)
-
-
-def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
-    low, high = np.quantile(values, [0.025, 0.975])
-    return float(values.mean()), float(low), float(high)
 
 
 def _between(solution: Solution, marginal: Marginal) -> float:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning, Severity, has_code

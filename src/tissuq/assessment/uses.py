@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
 from tissuq.experiments.curve import Curve

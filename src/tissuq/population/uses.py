@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, Use, Verdict, precision_of, relative_half_width, worst_of
 from tissuq.population.picture import numbers_of
 from tissuq.population.population import Population

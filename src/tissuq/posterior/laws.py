@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment.comparison import warnings_of_evidence
-from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.evidence import warnings_of_evidence
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.drawing.panels import panels
 from tissuq.errors import ConvergenceError, InputError, ModelError

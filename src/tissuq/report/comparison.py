@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.comparison import warnings_of_evidence
+from tissuq.assessment.evidence import warnings_of_evidence
 from tissuq.drawing.pieces import forest, rows
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.experiments.units import StressUnit

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.extent import has_energy, shares_of_discrepancy
+from tissuq.assessment.extent import has_energy
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE
 from tissuq.errors import TissuqError
 from tissuq.population.patient import check_one_control

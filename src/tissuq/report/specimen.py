@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
 from tissuq.assessment.answer import NOTABLE_SHARE
-from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.experiments.units import stress_unit
 from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described

@@ -12,7 +12,7 @@ from typing import Any
 
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.assessment.answer import Answer
-from tissuq.assessment.comparison import warnings_of_evidence
+from tissuq.assessment.evidence import warnings_of_evidence
 from tissuq.assessment.measurements import labels_of_tests
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
