@@ -279,7 +279,7 @@ def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) 
             with np.errstate(divide="ignore", invalid="ignore"):
                 is_cut = np.isfinite(prior.log_density(bound))
             is_beyond = sign * (values - bound) < edge if is_cut else sign * (values - run_end) < 0
-            usual = 0.0 if is_cut else float((sign * (prior_values - run_end) < 0).mean())
-            if posterior.weights[is_beyond].sum() > usual + MAX_EDGE_PROBABILITY:
+            of_prior = 0.0 if is_cut else float((sign * (prior_values - run_end) < 0).mean())
+            if posterior.weights[is_beyond].sum() > of_prior + MAX_EDGE_PROBABILITY:
                 (at_bounds if is_cut else beyond_runs).append(f"{symbol} ({end})")
     return at_bounds, beyond_runs

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import exp
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.extent import has_energy
-from tissuq.assessment.shares import shares_of_discrepancy
-from tissuq.assessment.uses import PRECISE
 from tissuq.errors import TissuqError
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import share_of_initial_stiffness, uses_of_population
+from tissuq.population.uses import uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -28,7 +25,7 @@ from tissuq.report.population_figures import (
     patient_figure,
     specimens_figure,
 )
-from tissuq.report.population_next_step import next_step_of
+from tissuq.report.population_in_words import about_law, about_modulus, next_step_of, share_of_discrepancy
 from tissuq.report.population_tables import (
     effects_of_covariates,
     needed_of,
@@ -39,7 +36,6 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
-from tissuq.result_warning import has_code
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -105,7 +101,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     population, unit, settings = study.population, study.unit, study.settings
     copies, relocated = _copies(study, beside)
     law = relocated["material"]
-    share = _share_of_discrepancy(population, study.warnings)
+    share = share_of_discrepancy(population, study.warnings)
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
@@ -127,7 +123,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
-        finding=_lead(study) + _about_law(population, share) + _about_modulus(population, share, words),
+        finding=_lead(study) + about_law(population, share) + about_modulus(population, share, words),
         uses=uses,
         next_step=next_step_of(
             population, study.warnings, share, settings.without, uses, has_aim=needed is not None
@@ -384,35 +380,3 @@ def _lead(study: PopulationStudy) -> str:
         f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
         f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
     )
-
-
-def _about_law(population: Population, share: float) -> str:
-    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
-    if share <= PRECISE:
-        return ""
-    law = population.complete.model.material.name
-    return (
-        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress (median of the "
-        f"specimens), and cards of a new specimen are of {law} alone."
-    )
-
-
-def _about_modulus(population: Population, share: float, words: str) -> str:
-    """Return why the modulus of a law that is wrong can be right, as a sentence after others."""
-    initial = share_of_initial_stiffness(population)
-    if words != MODULUS or not initial <= PRECISE < share:
-        return ""
-    return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
-
-
-def _share_of_discrepancy(population: Population, warnings: Sequence[str]) -> float:
-    """Return the share of the stress that the discrepancy carries: the median of the specimens.
-
-    Zero where there is stress at rest, or where it is not known of most specimens.
-    """
-    posteriors = population.posteriors
-    solutions = [fit.solution for fit in posteriors.values() if has_energy(fit.solution.model)]
-    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
-    known = [share for share, _, high in shares if high < 1]
-    is_clear = 2 * len(known) > len(posteriors) and not has_code(warnings, "stress-at-rest")
-    return float(np.median(known)) if is_clear else 0.0

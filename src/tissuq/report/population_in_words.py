@@ -1,16 +1,21 @@
-"""What to do next with a population: mend what is doubtful before anything is computed with a new specimen."""
+"""What a page says of the law of a population, and what to do next with it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from tissuq.assessment.extent import has_energy
+from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, Use, Verdict
 from tissuq.population import Population
-from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
+from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING, share_of_initial_stiffness
 from tissuq.population.warnings import far_specimens
+from tissuq.report.population_figures import MODULUS
 from tissuq.result_warning import has_code
 
-__all__ = ["next_step_of"]
+__all__ = ["about_law", "about_modulus", "next_step_of", "share_of_discrepancy"]
 
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
@@ -72,3 +77,35 @@ def next_step_of(
             "sets them apart (--covariates)"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
+
+
+def about_law(population: Population, share: float) -> str:
+    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
+    if share <= PRECISE:
+        return ""
+    law = population.complete.model.material.name
+    return (
+        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress (median of the "
+        f"specimens), and cards of a new specimen are of {law} alone."
+    )
+
+
+def about_modulus(population: Population, share: float, words: str) -> str:
+    """Return why the modulus of a law that is wrong can be right, as a sentence after others."""
+    initial = share_of_initial_stiffness(population)
+    if words != MODULUS or not initial <= PRECISE < share:
+        return ""
+    return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
+
+
+def share_of_discrepancy(population: Population, warnings: Sequence[str]) -> float:
+    """Return the share of the stress that the discrepancy carries: the median of the specimens.
+
+    Zero where there is stress at rest, or where it is not known of most specimens.
+    """
+    posteriors = population.posteriors
+    solutions = [fit.solution for fit in posteriors.values() if has_energy(fit.solution.model)]
+    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
+    known = [share for share, _, high in shares if high < 1]
+    is_clear = 2 * len(known) > len(posteriors) and not has_code(warnings, "stress-at-rest")
+    return float(np.median(known)) if is_clear else 0.0
