@@ -142,6 +142,12 @@ def stress_unit(text: str) -> StressUnit:
     multiple, unit = _without_power(name)
     if multiple != 1:
         return StressUnit(name, multiple * stress_unit(unit).to_mpa)
+    power_and_unit = name.lstrip("x×*· ")
+    if power_and_unit != name and _without_power(power_and_unit)[0] != 1:
+        raise InputError(
+            f"'{name}' may be what the numbers are to be multiplied by, or say by what they have been. In the first "
+            f"case write {power_and_unit}, without the sign of multiplication."
+        )
     compact = _compact(name)
     if compact == "mPa":
         raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
