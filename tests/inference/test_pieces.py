@@ -184,6 +184,19 @@ def test_the_hpd_at_a_bound_holds_its_mean_with_points_of_no_weight_far_off():
     assert low == pytest.approx(1 - 1e-5 * expon.ppf(0.95), abs=2e-6)
 
 
+def test_two_peaks_of_points_stay_apart():
+    """Smoothed by what both spread together, each was as wide as the gap between them."""
+    of_one = norm.ppf((np.arange(60) + 0.5) / 60)
+    marginal = marginal_of_points(np.concatenate([2 + 0.1 * of_one, 9 + 0.2 * of_one]), np.ones(120), (-np.inf, np.inf))
+    truth = [2 + 0.1 * norm.ppf(0.1), 2 + 0.1 * norm.ppf(0.9), 9 + 0.2 * norm.ppf(0.1), 9 + 0.2 * norm.ppf(0.9)]
+    assert [marginal.quantile(p) for p in (0.05, 0.45, 0.55, 0.95)] == pytest.approx(truth, abs=0.1)
+
+
+def test_points_of_which_one_holds_most_have_a_marginal():
+    marginal = marginal_of_points(np.array([0.0, 1.0, 2.0]), np.array([1.0, 8.0, 1.0]), (-np.inf, np.inf))
+    assert marginal.quantile(0.5) == pytest.approx(1.0, abs=0.01)
+
+
 def test_a_blend_is_the_mixture_of_its_parts():
     parts = [(w, marginal_of_mixture(np.ones(1), np.array([m]), np.array([1.0]))) for w, m in ((0.3, 0.0), (0.7, 2.0))]
     both = marginal_of_mixture(np.array([0.3, 0.7]), np.array([0.0, 2.0]), np.ones(2))

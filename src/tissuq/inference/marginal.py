@@ -125,12 +125,14 @@ def marginal_of_points(
 ) -> Marginal:
     """Return the marginal of weighted points within bounds, by a kernel estimate that keeps their variance.
 
-    Silverman's bandwidth, unless another is given; points near a bound are mirrored there, and elsewhere drawn towards
+    Silverman's bandwidth, unless another is given, for the shortest interval that holds half of them, as between two
+    peaks the standard deviation is that of neither; points near a bound are mirrored there, and elsewhere drawn towards
     the mean by what the kernel adds to the variance.
     """
     weights = weights / weights.sum()
     mean, sd = moments_of_values(weights, points)
-    bandwidth = bandwidth or 0.9 * sd * float(weights @ weights) ** 0.2
+    spread = min(sd, _shortest_half(points, weights) / 1.349 or sd)
+    bandwidth = bandwidth or 0.9 * spread * float(weights @ weights) ** 0.2
     if np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth:  # points far off would leave a narrow posterior few bins
         order = np.argsort(points)
         rising = np.cumsum(weights[order])
@@ -147,6 +149,15 @@ def marginal_of_points(
     smooth = np.convolve(np.pad(heights, reach, mode="symmetric"), kernel / kernel.sum(), mode="valid")
     cumulative = np.concatenate([[0.0], np.cumsum(smooth)])
     return Marginal.of(mean, sd, edges, np.interp(edges, edges[:-1] + 0.5 * step, smooth), cumulative)
+
+
+def _shortest_half(points: FloatArray, weights: FloatArray) -> float:
+    """Return the length of the shortest interval that holds half of weighted points; of a Gaussian 1.349 of its sd."""
+    order = np.argsort(points)
+    ascending, rising = points[order], np.cumsum(weights[order])
+    ends = np.searchsorted(rising, rising - weights[order] + 0.5)
+    begins = np.flatnonzero(ends < len(points))
+    return float((ascending[ends[begins]] - ascending[begins]).min())
 
 
 def marginal_of_logs(values: FloatArray, weights: FloatArray, step: float) -> Marginal:

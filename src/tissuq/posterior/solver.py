@@ -69,11 +69,11 @@ class Solver:
 
     def _is_integrated(self, model: StatisticalModel) -> bool:
         """Return whether there is an evidence without sampling."""
-        return self.method in ("auto", "exact") and (bool(model.energy_symbols) or not AdaptiveCells().why_not(model))
+        return self.method in ("auto", "exact") and (_is_on_lattices(model) or not AdaptiveCells().why_not(model))
 
     def needs_sampler(self, model: StatisticalModel) -> bool:
         """Return whether a model is sampled."""
-        is_slow = self.method == "auto" and not model.energy_symbols and bool(_why_not_soon(model))
+        is_slow = self.method == "auto" and not _is_on_lattices(model) and bool(_why_not_soon(model))
         return is_slow or not self._is_integrated(model)
 
     def _sums_noise(self, model: StatisticalModel) -> bool:
@@ -91,7 +91,7 @@ class Solver:
         try:
             return enumerator.solve(models, self.seed)
         except ConvergenceError as error:
-            if self.method != "auto" or not isinstance(enumerator, AdaptiveCells):
+            if self.method != "auto" or models[0].energy_symbols:
                 raise
             if len(models) > 1:
                 return [solution for model in models for solution in self._solve([model])]
@@ -103,7 +103,7 @@ class Solver:
         are_checked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
-            if model.energy_symbols:
+            if _is_on_lattices(model):
                 return lattice.solve([model], self.seed)[0]
             return self._solve([model], AdaptiveCells(next(are_checked, False), accuracy.tolerance))[0]
 
@@ -119,7 +119,7 @@ class Solver:
         """
         if self._sums_noise(model):
             return NoiseGrid(self._known_solver)
-        if model.energy_symbols and self.method in ("auto", "exact"):
+        if _is_on_lattices(model) and self.method in ("auto", "exact"):
             return AmplitudeLattice()
         if self.method == "auto":
             refusal = AdaptiveCells().why_not(model) or _why_not_soon(model)
@@ -137,6 +137,13 @@ def _sampler(method: Method, refusal: str = "") -> Enumerator:
     from tissuq.inference.enumerators.sampled import JointNuts, Nuts, TemperedSmc
 
     return {"nuts": Nuts(refusal), "smc": TemperedSmc(), "joint": JointNuts()}[method]
+
+
+def _is_on_lattices(model: StatisticalModel) -> bool:
+    """Return whether lattices serve: of an energy discrepancy, or without one where cells would not do, or not soon."""
+    return bool(
+        model.energy_symbols or (model.energy_members and (AdaptiveCells().why_not(model) or _why_not_soon(model)))
+    )
 
 
 def _why_not_soon(model: StatisticalModel) -> str:

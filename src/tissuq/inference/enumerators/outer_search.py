@@ -21,6 +21,8 @@ FloatArray = NDArray[np.float64]
 
 VALUES_PER_PARAMETER = 64
 """Values taken at first for each of the parameters, and once more."""
+VALUES_OF_ONE_MEMBER = 5
+"""So many times more values are taken, and are effective, where a single member makes each of them cheap."""
 SCOUT_MEMBERS = 6
 """Members, about, whose posterior guides the search for the values."""
 GUIDED_DIVISOR = 8
@@ -62,6 +64,7 @@ class _Search:
 
     def __init__(self, sums: Sums, outer: Outer, member_count: int) -> None:
         self._sums, self._outer, self._members = sums, outer, np.arange(member_count)
+        self._multiple = VALUES_OF_ONE_MEMBER if member_count == 1 else 1
 
     def on_line(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
         """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
@@ -117,8 +120,8 @@ class _Search:
             nodes.extend(new)
             return self._log_masses(new, points)
 
-        count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
-        min_effective = guide.accuracy.min_effective
+        count = self._multiple * VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
+        min_effective = self._multiple * guide.accuracy.min_effective
         adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
         guide.proposal, nodes = adaptation.proposal, nodes[-len(adaptation.points) :]
         self._check_place(guide.proposal.mean)
