@@ -20,8 +20,7 @@ from tissuq.prediction.bands import predictive_mixtures, speaks_of
 from tissuq.prediction.scores import interval_score, root_mean_square
 from tissuq.studies.stream import Campaign
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
-from tissuq.validation.tissues.protocols import ESTIMAND_OF_PROTOCOL, PROTOCOLS, Split
-from tissuq.validation.tissues.settings import RIVALS, TissueSettings
+from tissuq.validation.tissues.settings import ESTIMAND_OF_PROTOCOL, PROTOCOLS, RIVALS, Split, TissueSettings
 
 if TYPE_CHECKING:
     import pandas as pd
