@@ -78,13 +78,8 @@ class DrawStresses:
     @cached_property
     def stability_states(self) -> StabilityStates:
         """The states in which laws are to be stable, up to the last of `REACHES`."""
-        return StabilityStates(self.largest_invariants)
-
-    @property
-    def largest_invariants(self) -> tuple[float, float]:
-        """The largest I1 - 3 and I2 - 3 of the states."""
         largest_1, largest_2 = self.ensemble.most
-        return REACHES[-1] * largest_1, REACHES[-1] * largest_2
+        return StabilityStates((REACHES[-1] * largest_1, REACHES[-1] * largest_2))
 
     @cached_property
     def wanted_stiffness(self) -> FloatArray:
