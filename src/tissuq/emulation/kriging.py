@@ -27,7 +27,6 @@ __all__ = [
     "fitted",
     "leave_one_out",
     "moments",
-    "squared_differences",
     "trend_basis",
 ]
 
