@@ -23,7 +23,7 @@ from tissuq.app.sessions import GRACE, Sessions
 from tissuq.app.workers import Workers
 from tissuq.errors import InputError
 
-__all__ = ["LOOPBACK", "PAGE_POLICY", "Guard", "serve"]
+__all__ = ["Guard", "serve"]
 
 LOOPBACK = "127.0.0.1"
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]

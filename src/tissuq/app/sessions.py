@@ -17,7 +17,7 @@ from tissuq.app.workers import News, Workers
 from tissuq.errors import InputError
 from tissuq.studies.settings import is_inside
 
-__all__ = ["GRACE", "MAX_FILE", "MAX_FILES", "MAX_TOTAL", "Session", "Sessions", "free_name", "harmless_name", "store"]
+__all__ = ["GRACE", "MAX_FILE", "MAX_TOTAL", "Session", "Sessions", "harmless_name", "store"]
 
 GRACE = 15.0
 """Seconds after which a session ends whose page has gone."""

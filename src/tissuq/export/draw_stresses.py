@@ -15,7 +15,7 @@ from tissuq.export.states import PrincipalStates, SeenStates, are_stable, mode_s
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = ["MIN_RELATIVE_STRESS", "REACHES", "DrawStresses", "Judged", "within"]
+__all__ = ["REACHES", "DrawStresses", "Judged", "within"]
 
 FloatArray = NDArray[np.float64]
 
