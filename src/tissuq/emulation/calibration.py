@@ -158,7 +158,8 @@ class Calibration:
 
     def draws(self, count: int) -> FloatArray:
         """Return equally probable draws (count, D) of all parameters."""
-        return self.posterior.thinned(count)
+        flat = self.posterior.draws.reshape(-1, len(self.problem.symbols))
+        return np.asarray(flat[np.linspace(0, len(flat) - 1, count).round().astype(int)])
 
     def summary(self, prob: float = 0.95) -> pd.DataFrame:
         """Return mean, sd, median and highest-density interval of every parameter, in the forward model's units.
