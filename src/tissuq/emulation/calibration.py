@@ -123,7 +123,18 @@ class Calibration:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Warnings that the user must read, in sentences."""
-        return tuple(calibration_warnings(self))
+        exact = self.without_emulator_error.posterior
+        sentences = calibration_warnings(
+            self.problem,
+            self.emulator,
+            self.check,
+            self.posterior,
+            exact,
+            self.emulator_share,
+            dict(zip(self.problem.forward_symbols, self.sensitivity["total"].tolist(), strict=True)),
+            self.likelihood,
+        )
+        return tuple(sentences)
 
     @cached_property
     def without_emulator_error(self) -> Calibration:
@@ -158,8 +169,7 @@ class Calibration:
 
     def draws(self, count: int) -> FloatArray:
         """Return equally probable draws (count, D) of all parameters."""
-        flat = self.posterior.draws.reshape(-1, len(self.problem.symbols))
-        return np.asarray(flat[np.linspace(0, len(flat) - 1, count).round().astype(int)])
+        return self.posterior.thinned(count)
 
     def summary(self, prob: float = 0.95) -> pd.DataFrame:
         """Return mean, sd, median and highest-density interval of every parameter, in the forward model's units.
@@ -266,7 +276,9 @@ class Calibration:
         """
         from tissuq.emulation.material_posterior import material_posterior
 
-        return material_posterior(self, material, stretch, mode, unit)
+        return material_posterior(
+            self.problem, self.posterior, material, stretch, mode=mode, unit=unit, runs=len(self.runs), seed=self.seed
+        )
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""

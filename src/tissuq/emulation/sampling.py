@@ -76,6 +76,11 @@ class SampledPosterior:
         columns = zip(self.priors.items(), self.values.T, strict=True)
         return {symbol: marginal_of_points(column, self.weights, prior.support) for (symbol, prior), column in columns}
 
+    def thinned(self, count: int) -> FloatArray:
+        """Return equally probable draws (count, D) of all parameters."""
+        flat = self.draws.reshape(-1, len(self.priors))
+        return np.asarray(flat[np.linspace(0, len(flat) - 1, count).round().astype(int)])
+
 
 def sample_posterior(likelihood: Likelihood, seed: int = 0, method: Method = "auto") -> SampledPosterior:
     """Return the posterior of the parameters.

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem, is_far
 from tissuq.emulation.runs import EmulatorCheck
 from tissuq.experiments.smoothing import scatter
 from tissuq.model.discrepancy import PinnedProcess
 
 if TYPE_CHECKING:
-    from tissuq.emulation.calibration import Calibration
+    from tissuq.emulation.likelihood import Likelihood
+    from tissuq.emulation.sampling import SampledPosterior
 
 __all__ = ["NO_PARAMETERS_FIT", "calibration_warnings"]
 
@@ -65,31 +67,55 @@ DISCREPANCY_WARNINGS = {
 """Warning that belongs to each discrepancy beside a forward model."""
 
 
-def calibration_warnings(calibration: Calibration) -> Iterator[str]:
-    """Yield the warnings that a calibration carries, the gravest first."""
-    if not calibration.converged:
-        yield calibration.posterior.verdict
-    if without_effect := list(_without_effect(calibration)):
+def calibration_warnings(
+    problem: Problem,
+    emulator: Emulator,
+    check: EmulatorCheck,
+    posterior: SampledPosterior,
+    exact: SampledPosterior,
+    emulator_share: Mapping[str, float],
+    totals: Mapping[str, float],
+    likelihood: Likelihood,
+) -> Iterator[str]:
+    """Yield the warnings that a calibration carries, the gravest first.
+
+    Parameters
+    ----------
+    problem : Problem
+    emulator : Emulator
+    check : EmulatorCheck
+        Each run of the emulator predicted from the others.
+    posterior, exact : SampledPosterior
+        With the emulator's error, and as if it were exact.
+    emulator_share : mapping of str to float
+        Share of every parameter's posterior variance that is due to the emulator's error.
+    totals : mapping of str to float
+        Total sensitivity index of every parameter of the model.
+    likelihood : Likelihood
+    """
+    if not posterior.converged:
+        yield posterior.verdict
+    if without_effect := list(_without_effect(problem, posterior, totals)):
         yield (
             f"the model hardly depends on {', '.join(without_effect)}, and the result is the prior: see whether the "
             "model reads a parameter of this name (--prior)."
         )
-    yield from _far_from_zero_load(calibration.problem)
-    none_fit = list(_no_parameters_fit(calibration))
+    yield from _far_from_zero_load(problem)
+    none_fit = list(_no_parameters_fit(problem, emulator, posterior, likelihood))
     yield from none_fit
-    if calibration.runs.failed.any():
-        share = _share_near_failures(calibration)
+    if emulator.runs.failed.any():
+        share = _share_near_failures(emulator, posterior)
         position = (
             f"A share of {100 * share:.0f} % of the posterior is nearer to a failed run than to any other: there the "
             "emulator is unreliable."
             if share > MAX_SHARE_NEAR_FAILURES
             else "The posterior is not near them."
         )
-        yield f"{calibration.runs.failure_summary} {position}"
+        yield f"{emulator.runs.failure_summary} {position}"
     if not none_fit:  # of which there is nothing to be made more accurate
-        yield from _large_error(calibration)
-    yield from _over_confident(calibration.check)
-    at_bounds, beyond_runs = _at_ends(calibration)
+        yield from _large_error(problem, posterior, exact, emulator_share)
+    yield from _over_confident(check)
+    at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
         yield (
             f"the posterior lies beyond the runs of the model in {', '.join(beyond_runs)}, which lie where its prior "
@@ -101,16 +127,17 @@ def calibration_warnings(calibration: Calibration) -> Iterator[str]:
             f"the posterior reaches the bound of the prior of {', '.join(at_bounds)}: there the prior, not the data, "
             "decides. Give a wider prior, unless the bound is intended."
         )
-    yield DISCREPANCY_WARNINGS[calibration.problem.discrepancy.name]
+    yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
 
 
-def _no_parameters_fit(calibration: Calibration) -> Iterator[str]:
+def _no_parameters_fit(
+    problem: Problem, emulator: Emulator, posterior: SampledPosterior, likelihood: Likelihood
+) -> Iterator[str]:
     """Yield a warning where the measurements cannot be what the model gives at any parameters, beyond all errors."""
     from scipy.special import gammaincc
 
-    problem, likelihood = calibration.problem, calibration.likelihood
-    draws, measured, size = calibration.draws(DRAWS_NEAR_FAILURES), problem.measured, len(problem.measured)
-    points, outputs = calibration.runs.good
+    draws, measured, size = posterior.thinned(DRAWS_NEAR_FAILURES), problem.measured, len(problem.measured)
+    points, outputs = emulator.runs.good
     at_draws = likelihood.misfits(draws)
     of_discrepancy = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
     misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, of_discrepancy])).min())
@@ -148,12 +175,11 @@ def _no_parameters_fit(calibration: Calibration) -> Iterator[str]:
     )
 
 
-def _without_effect(calibration: Calibration) -> Iterator[str]:
+def _without_effect(problem: Problem, posterior: SampledPosterior, totals: Mapping[str, float]) -> Iterator[str]:
     """Yield the parameters on which the outputs do not depend, and that the measurements leave where they were."""
-    for symbol, prior in calibration.problem.forward_priors.items():
-        if calibration.sensitivity["total"][symbol] < MIN_EFFECT:
-            both = prior, calibration.marginals[symbol]
-            prior_width, width = (distribution.quantile(0.75) - distribution.quantile(0.25) for distribution in both)
+    for symbol, prior in problem.forward_priors.items():
+        if totals[symbol] < MIN_EFFECT:
+            prior_width, width = (of.quantile(0.75) - of.quantile(0.25) for of in (prior, posterior.marginals[symbol]))
             if width > MIN_SHARE_OF_PRIOR * prior_width:
                 yield symbol
 
@@ -195,13 +221,14 @@ def _noise_is_misfit(problem: Problem, predicted: FloatArray) -> bool:
     return False
 
 
-def _large_error(calibration: Calibration) -> Iterator[str]:
+def _large_error(
+    problem: Problem, posterior: SampledPosterior, exact: SampledPosterior, emulator_share: Mapping[str, float]
+) -> Iterator[str]:
     """Yield a warning where the emulator's error widens or shifts the posterior notably."""
-    forward, emulator_share = calibration.problem.forward_symbols, calibration.emulator_share
-    exact = calibration.without_emulator_error.marginals
+    forward = problem.forward_symbols
     shifts = {
-        symbol: abs(exact[symbol].mean - marginal.mean) / marginal.sd
-        for symbol, marginal in calibration.marginals.items()
+        symbol: abs(exact.marginals[symbol].mean - marginal.mean) / marginal.sd
+        for symbol, marginal in posterior.marginals.items()
     }
     largest_share = max(forward, key=lambda symbol: emulator_share[symbol])
     largest_shift = max(forward, key=lambda symbol: shifts[symbol])
@@ -230,21 +257,20 @@ def _over_confident(check: EmulatorCheck) -> Iterator[str]:
         )
 
 
-def _share_near_failures(calibration: Calibration) -> float:
+def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> float:
     """Return the share of the posterior whose nearest run failed, in the unit box of the runs."""
-    runs, coordinates = calibration.runs, calibration.emulator.coordinates
-    draws = calibration.draws(DRAWS_NEAR_FAILURES)[:, : len(runs.symbols)]
+    runs, coordinates = emulator.runs, emulator.coordinates
+    draws = posterior.thinned(DRAWS_NEAR_FAILURES)[:, : len(runs.symbols)]
     run_points, draw_points = coordinates.of(runs.points), coordinates.of(draws)
     nearest = ((draw_points[:, None] - run_points[None]) ** 2).sum(axis=2).argmin(axis=1)
     return float(runs.failed[nearest].mean())
 
 
-def _at_ends(calibration: Calibration) -> tuple[list[str], list[str]]:
+def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[list[str], list[str]]:
     """Return where the posterior is at bounds of priors, and where more of it than of the prior is beyond all runs."""
-    problem, posterior = calibration.problem, calibration.posterior
     at_bounds: list[str] = []
     beyond_runs: list[str] = []
-    for symbol, column in zip(problem.forward_symbols, calibration.runs.points.T, strict=True):
+    for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
         prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
         prior_values = np.asarray(prior.quantile((np.arange(PRIOR_POINTS) + 0.5) / PRIOR_POINTS))
         run_ends, signs = (float(column.min()), float(column.max())), (1.0, -1.0)
