@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from tissuq.app.guard import Guard
+from tissuq.app.server import Guard
 
 TOKEN, HOST = "secret-word", "127.0.0.1:8000"
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tissuq.app import uploads
+from tissuq.app import sessions
 from tissuq.errors import InputError
 
 
@@ -20,13 +20,13 @@ async def chunks(*parts):
 @pytest.mark.slow
 @given(st.text(max_size=300))
 def test_every_name_becomes_one_of_a_file_in_the_folder(name):
-    harmless = uploads.harmless_name(name)
+    harmless = sessions.harmless_name(name)
     assert harmless
     assert len(harmless) <= 112
     assert not set(harmless) & set("/\\:*?\"<>|#$`;&'\0\n")
     assert harmless[0] not in ".- "
     assert harmless.lower() not in ("runs", "cards", "con", "nul")
-    assert uploads.harmless_name(harmless) == harmless
+    assert sessions.harmless_name(harmless) == harmless
 
 
 @pytest.mark.parametrize(
@@ -42,11 +42,11 @@ def test_every_name_becomes_one_of_a_file_in_the_folder(name):
     ],
 )
 def test_names_that_mean_something_are_kept_as_far_as_they_are_harmless(name, harmless):
-    assert uploads.harmless_name(name) == harmless
+    assert sessions.harmless_name(name) == harmless
 
 
 def test_two_files_of_one_name_are_both_stored(tmp_path):
-    names = [asyncio.run(uploads.store(chunks(b"1"), name, tmp_path)) for name in ("a.csv", "A.csv", "a.csv")]
+    names = [asyncio.run(sessions.store(chunks(b"1"), name, tmp_path)) for name in ("a.csv", "A.csv", "a.csv")]
     assert names == ["a.csv", "A-2.csv", "a-3.csv"]
 
 
@@ -54,15 +54,15 @@ def test_two_files_of_one_name_are_both_stored(tmp_path):
     ("parts", "words"), [((b"12345", b"67890", b"1"), "too large"), ((), "empty")], ids=["large", "empty"]
 )
 def test_what_is_too_large_or_empty_is_refused_and_gone(tmp_path, monkeypatch, parts, words):
-    monkeypatch.setattr(uploads, "MAX_FILE", 10)
+    monkeypatch.setattr(sessions, "MAX_FILE", 10)
     with pytest.raises(InputError, match=words):
-        asyncio.run(uploads.store(chunks(*parts), "a.csv", tmp_path))
+        asyncio.run(sessions.store(chunks(*parts), "a.csv", tmp_path))
     assert not list(tmp_path.iterdir())
 
 
 def test_all_files_together_are_limited_too(tmp_path, monkeypatch):
-    monkeypatch.setattr(uploads, "MAX_TOTAL", 10)
-    asyncio.run(uploads.store(chunks(b"12345678"), "a.csv", tmp_path))
+    monkeypatch.setattr(sessions, "MAX_TOTAL", 10)
+    asyncio.run(sessions.store(chunks(b"12345678"), "a.csv", tmp_path))
     with pytest.raises(InputError, match="all 0 MB"):
-        asyncio.run(uploads.store(chunks(b"123"), "b.csv", tmp_path))
+        asyncio.run(sessions.store(chunks(b"123"), "b.csv", tmp_path))
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]

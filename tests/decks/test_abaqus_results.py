@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tissuq.decks import AbaqusDeck, CommandSolver, abaqus_results, parse_quantity
+from tissuq.decks import AbaqusDeck, CommandSolver, parse_quantity
+from tissuq.decks.abaqus import SCRIPT
 from tissuq.decks.deck import Deck
 from tissuq.decks.model_run import ModelRun, SolverRun, carried_out
 from tissuq.decks.result_file import Results
@@ -216,7 +217,7 @@ def test_sets_of_sets_of_instances_are_left_to_the_result_file(tmp_path):
 
 def test_the_script_runs_in_python_2_as_well():
     """As far as this shows without it: no annotations, no f-strings, no keyword-only arguments, only ASCII."""
-    text = Path(abaqus_results.SCRIPT).read_bytes().decode("ascii")
+    text = Path(SCRIPT).read_bytes().decode("ascii")
     nodes = list(ast.walk(ast.parse(text)))
     assert not [node for node in nodes if isinstance(node, (ast.JoinedStr, ast.AnnAssign, ast.NamedExpr, ast.Starred))]
     functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tissuq.decks import AnsysDeck, parse_quantity
-from tissuq.decks.ansys_results import AnsysResults
+from tissuq.decks.ansys import AnsysResults
 from tissuq.decks.result_file import Results
 from tissuq.errors import InputError
 

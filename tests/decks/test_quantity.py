@@ -13,7 +13,7 @@ from tissuq.decks.abaqus import AbaqusDeck
 from tissuq.decks.calculix_results import CalculiXResults, Frd
 from tissuq.decks.deck import deck_formats
 from tissuq.decks.model_run import check_sets
-from tissuq.decks.quantity import Results
+from tissuq.decks.result_file import Results
 from tissuq.decks.solver import solver_for
 from tissuq.errors import InputError
 

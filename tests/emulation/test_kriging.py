@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tissuq.emulation.kriging import Kriging, fitted, leave_one_out, moments
-from tissuq.emulation.length_scales import LENGTH_BOUNDS, NUGGET_BOUNDS, LengthScales
+from tissuq.emulation.kriging import LENGTH_BOUNDS, NUGGET_BOUNDS, Kriging, LengthScales, fitted, leave_one_out, moments
 
 
 def dense(kernel, one, other, lengths):

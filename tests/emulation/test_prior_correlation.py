@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import tissuq as tq
-from tissuq.emulation.prior_correlation import correlated
+from tissuq.emulation.problem import correlated
 from tissuq.errors import InputError
 from tissuq.studies.earlier_run import priors_of, priors_of_run
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tissuq.export.constrained_fit import constrained_least_squares, fit_within, least_squares
+from tissuq.export.nearest_law import constrained_least_squares, fit_within, least_squares
 
 
 def problem(seed, unknowns=4, equations=12, inequalities=6):

@@ -20,7 +20,7 @@ from tissuq.finite_elements import (
     indentation_force,
     respond,
 )
-from tissuq.finite_elements.case import graded, grid
+from tissuq.finite_elements.bodies import graded, grid
 from tissuq.finite_elements.solver import Solver
 from tissuq.mechanics import engineering_stress, material_named
 

@@ -9,8 +9,8 @@ import pytest
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements import ClampedBar, Indentation, bar_force, respond, simulate
+from tissuq.finite_elements.case import felupe
 from tissuq.finite_elements.first_order import FirstOrderError
-from tissuq.finite_elements.library import felupe
 from tissuq.finite_elements.response import Solve, run_in_turn, solved
 from tissuq.finite_elements.warnings import simulation_warnings
 from tissuq.mechanics import material_named
@@ -125,7 +125,7 @@ def test_a_reader_is_warned_of_strains_beyond_the_measurements_and_of_few_draws(
     assert "compensate" in " ".join(
         simulation_warnings(replace(found, forces=found.forces | {"alone": -found.forces["complete"]}))
     )
-    assert "too coarse" in " ".join(simulation_warnings(replace(found, mesh_change=(-0.2, 1.0))))
+    assert "too coarse" in " ".join(simulation_warnings(replace(found, mesh_changes=((1.0, -0.2),))))
 
 
 @pytest.mark.parametrize("ratio", [0.01, 2 / 3, np.nan])

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from tissuq.finite_elements import PlateWithHole
-from tissuq.finite_elements.case import grid
+from tissuq.finite_elements.bodies import grid
 from tissuq.report.simulation_figures import write_collection, write_vtu
 
 

@@ -10,9 +10,14 @@ from tissuq.emulation.material_posterior import card_material
 from tissuq.finite_elements.first_order import first_order_forces
 from tissuq.finite_elements.response import BULK_RATIO
 from tissuq.mechanics import material_named
-from tissuq.validation.structures import StructureStudySettings, summarise_structures, tasks_of
-from tissuq.validation.structures.campaign import simulated_tests
-from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES
+from tissuq.validation.structures import (
+    KNOWN_LAWS,
+    STRUCTURES,
+    StructureStudySettings,
+    simulated_tests,
+    summarise_structures,
+    tasks_of,
+)
 
 
 def test_the_first_tests_of_every_truth_come_before_any_second():

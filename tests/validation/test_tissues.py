@@ -11,9 +11,7 @@ import pytest
 import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.validation.tissues import TissueSettings, read_corpus, run_benchmark, summarise_tissues
-from tissuq.validation.tissues.benchmark import carry_out, predicted, tasks_of
-from tissuq.validation.tissues.protocols import PROTOCOLS
-from tissuq.validation.tissues.settings import RIVALS
+from tissuq.validation.tissues.benchmark import PROTOCOLS, RIVALS, carry_out, predicted, tasks_of
 
 BIAXIAL = """mode,stretch,stress_MPa,stretch_2,stress_2_MPa,direction,specimen
 """

@@ -15,15 +15,18 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from tissuq.app.guard import REPORT_POLICY
-from tissuq.app.sessions import Session, Sessions
+from tissuq.app.sessions import MAX_FILE, MEGABYTE, Session, Sessions, store
 from tissuq.app.tasks import TASKS
-from tissuq.app.uploads import MAX_FILE, MEGABYTE, store
 from tissuq.errors import TissuqError
 
 __all__ = ["STATIC", "routes"]
 
 STATIC = Path(__file__).parent / "static"
+REPORT_POLICY = (
+    "sandbox allow-scripts allow-modals; default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+    "script-src 'unsafe-inline'; frame-ancestors 'self'"
+)
+"""What a report may do that stands in the page: draw itself. It cannot reach the page."""
 HEARTBEAT = 15.0
 """Seconds after which a line is sent when there are no news, so that a page that has gone is noticed."""
 MAX_REQUEST = 1_000_000

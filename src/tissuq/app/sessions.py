@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import re
 import shutil
+import unicodedata
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -14,24 +17,21 @@ from tissuq.app.workers import News, Workers
 from tissuq.errors import InputError
 from tissuq.studies.settings import is_inside
 
-__all__ = ["GRACE", "Session", "Sessions"]
+__all__ = ["GRACE", "MAX_FILE", "MAX_TOTAL", "Session", "Sessions", "harmless_name", "store"]
 
 GRACE = 15.0
 """Seconds after which a session ends whose page has gone."""
 MAX_SESSIONS = 50
 FIRST_SIGN = 60.0
 """Seconds within which a new session's page must listen."""
-
-
 SHOWN = 200
 """Letters of a name in a message."""
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:  # such as a name that is too long
-        return False
+MEGABYTE = 1_000_000
+MAX_FILE, MAX_TOTAL, MAX_FILES = 50 * MEGABYTE, 200 * MEGABYTE, 60
+"""Bytes of one file, bytes of all files of a session, and their number."""
+MAX_LETTERS = 100
+RESERVED = re.compile(r"(?i)(runs|cards|con|prn|aux|nul|com\d|lpt\d)(\.|$)")
+"""Names that Windows or this page has another use for."""
 
 
 class Session:
@@ -68,7 +68,7 @@ class Session:
             When there is no such file, or it lies elsewhere.
         """
         path = self.folder / name
-        if not (is_inside(path, self.folder.resolve()) and _exists(path)):
+        if not (is_inside(path, self.folder.resolve()) and os.path.exists(path)):
             raise InputError(f"there is no '{name[:SHOWN]}' in this session.")
         return path.resolve()
 
@@ -197,3 +197,61 @@ class Sessions:
             with suppress(OSError):
                 self.end(session)
         await self.workers.stop()
+
+
+def harmless_name(name: str) -> str:
+    """Return the name of a file without folders, signs that shells or messages give a meaning, and excess length.
+
+    Examples
+    --------
+    >>> harmless_name("../../etc/pass;wd.csv"), harmless_name("/data/Test 1 (kPa).xlsx")
+    ('pass_wd.csv', 'Test 1 (kPa).xlsx')
+    """
+    last = unicodedata.normalize("NFC", name).replace("\\", "/").rpartition("/")[2]
+    plain = re.sub(r"[^\w .,()+=\[\]-]", "_", last).strip().lstrip(".-").strip() or "file"
+    stem, dot, ending = plain.rpartition(".") if "." in plain else (plain, "", "")
+    short = stem[: MAX_LETTERS - len(dot + ending[:10])].strip() + dot + ending[:10]
+    return f"_{short}" if RESERVED.match(short) else short
+
+
+def free_name(name: str, folder: Path) -> str:
+    """Return a name that no file in a folder has, also not in other letters (``A.csv``, ``a.csv``)."""
+    taken = {path.name.casefold() for path in folder.iterdir()}
+    stem, dot, ending = name.rpartition(".") if "." in name else (name, "", "")
+    number, free = 1, name
+    while free.casefold() in taken:
+        number += 1
+        free = f"{stem}-{number}{dot}{ending}"
+    return free
+
+
+async def store(chunks: AsyncIterator[bytes], name: str, folder: Path) -> str:
+    """Write what arrives into a file of a folder; return its name there.
+
+    Raises
+    ------
+    InputError
+        When it is empty, too large, or there are too many; nothing of it is then left.
+    """
+    sizes = [path.stat().st_size for path in folder.iterdir() if path.is_file()]
+    if len(sizes) >= MAX_FILES:
+        raise InputError(f"there are {MAX_FILES} files already: remove some, or use 'tissuq fit' for so many.")
+    target = folder / free_name(harmless_name(name), folder)
+    size = 0
+    try:
+        with target.open("xb") as file:
+            async for chunk in chunks:
+                size += len(chunk)
+                if size > MAX_FILE or size + sum(sizes) > MAX_TOTAL:
+                    limit = f"{MAX_FILE // MEGABYTE} MB" if size > MAX_FILE else f"all {MAX_TOTAL // MEGABYTE} MB"
+                    raise InputError(
+                        f"'{target.name}' is too large for this page ({limit} at most). Take fewer rows, or use the "
+                        f"command line, which has no limit: tissuq fit '{target.name}'."
+                    )
+                file.write(chunk)
+        if not size:
+            raise InputError(f"'{target.name}' is empty: was it saved before it was dropped here?")
+    except BaseException:
+        target.unlink(missing_ok=True)
+        raise
+    return target.name

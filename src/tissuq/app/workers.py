@@ -21,6 +21,8 @@ SPAWNED = multiprocessing.get_context("spawn")  # a fork of a process with threa
 LIGHT = ("choices", "inspect")
 """Tasks that take a moment and need neither JAX nor Matplotlib."""
 PREPARED = "prepared"
+MOST_FITS = 2
+"""Fits that go on at once, where the computer has the cores."""
 
 
 class News(NamedTuple):
@@ -124,12 +126,10 @@ class Workers:
     ----------
     scratch : Path
         Folder that is deleted after the processes have ended, in which they may leave files.
-    fitting : int, optional
-        How many fits go on at once; unless given, two where the computer has two cores or more.
     """
 
-    def __init__(self, scratch: Path, fitting: int | None = None) -> None:
-        fitting_limit = fitting or min(2, os.cpu_count() or 1)
+    def __init__(self, scratch: Path) -> None:
+        fitting_limit = min(MOST_FITS, os.cpu_count() or 1)
         self._threads = ThreadPoolExecutor(max_workers=fitting_limit + 2, thread_name_prefix="news")
         self._light = _Pool(scratch, 1, self._threads, is_light=True)
         self._heavy = _Pool(scratch, fitting_limit, self._threads, is_light=False)

@@ -1,9 +1,7 @@
 """The user's model in an input deck: its material replaced, the solver run, and what it gives read."""
 
-from tissuq.decks.abaqus import AbaqusDeck
-from tissuq.decks.abaqus_results import AbaqusResults
-from tissuq.decks.ansys import AnsysDeck
-from tissuq.decks.ansys_results import AnsysResults
+from tissuq.decks.abaqus import AbaqusDeck, AbaqusResults
+from tissuq.decks.ansys import AnsysDeck, AnsysResults
 from tissuq.decks.calculix_results import CalculiXResults
 from tissuq.decks.deck import Deck, DeckFormat, DeckMaterial, deck_formats
 from tissuq.decks.febio import FEBioDeck

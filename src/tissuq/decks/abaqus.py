@@ -1,15 +1,29 @@
-"""Decks of Abaqus and CalculiX: ``*MATERIAL`` blocks, included files, and sets of nodes."""
+"""Abaqus: its decks, which CalculiX reads, too, and its result file (``.odb``), which only its own Python opens."""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import shlex
+import shutil
+import subprocess
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, MeshSize, lines_of
+from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Values, unknown_set
 from tissuq.errors import InputError
 
-__all__ = ["AbaqusDeck", "Keyword", "keywords_of"]
+__all__ = ["AbaqusDeck", "AbaqusResults", "Keyword", "keywords_of"]
+
+FloatArray = NDArray[np.float64]
 
 ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
 """Options of a material that a card replaces."""
@@ -76,6 +90,11 @@ def keywords_of(content: bytes) -> Iterator[Keyword]:
         yield Keyword(_joined(name), parameters, head[0].start, end, data)
 
 
+def _keywords_in(files: Sequence[bytes]) -> Iterator[Keyword]:
+    """Return the keywords of several files, one after the other."""
+    return chain.from_iterable(map(keywords_of, files))
+
+
 def _joined(word: str) -> str:
     """Return a keyword as the programs compare it: without blanks, in capitals."""
     return re.sub(r"\s", "", word).upper()
@@ -120,20 +139,17 @@ class AbaqusDeck(DeckFormat):
         """
         sets: dict[str, set[int]] = {}
         references: dict[str, set[str]] = {}
-        for content in files:
-            for keyword in keywords_of(content):
-                name = keyword.parameters.get("NSET", "").upper()
-                if keyword.name not in ("NSET", "NODE") or not name:
-                    continue
-                members, names = sets.setdefault(name, set()), references.setdefault(name, set())
-                try:
-                    numbers, referenced = _members(keyword)
-                except (ValueError, TypeError) as error:
-                    raise InputError(
-                        f"the numbers of the set of nodes '{name}' are not understood ({error})."
-                    ) from error
-                members |= numbers
-                names |= referenced
+        for keyword in _keywords_in(files):
+            name = keyword.parameters.get("NSET", "").upper()
+            if keyword.name not in ("NSET", "NODE") or not name:
+                continue
+            members, names = sets.setdefault(name, set()), references.setdefault(name, set())
+            try:
+                numbers, referenced = _members(keyword)
+            except (ValueError, TypeError) as error:
+                raise InputError(f"the numbers of the set of nodes '{name}' are not understood ({error}).") from error
+            members |= numbers
+            names |= referenced
         gone = _of_instances(references)
         for name in gone:
             del sets[name], references[name]
@@ -149,13 +165,13 @@ class AbaqusDeck(DeckFormat):
 
     def set_names(self, files: Sequence[bytes], *, of_elements: bool) -> set[str]:
         wanted = NAMES_OF_SETS + NAMES_OF_ELEMENT_SETS * of_elements
-        keywords = [keyword for content in files for keyword in keywords_of(content) if keyword.name not in USERS]
+        keywords = [keyword for keyword in _keywords_in(files) if keyword.name not in USERS]
         return {
             keyword.parameters[name].upper() for keyword in keywords for name in wanted if name in keyword.parameters
         }
 
     def printed_elements(self, files: Sequence[bytes]) -> set[tuple[str, str]]:
-        printing = [keyword for content in files for keyword in keywords_of(content) if keyword.name == "ELPRINT"]
+        printing = [keyword for keyword in _keywords_in(files) if keyword.name == "ELPRINT"]
         return {
             (word.strip().upper(), keyword.parameters.get("ELSET", "").upper())
             for keyword in printing
@@ -165,7 +181,7 @@ class AbaqusDeck(DeckFormat):
 
     def mesh_size(self, files: Sequence[bytes]) -> MeshSize | None:
         counts: dict[int, int] = {}
-        for keyword in (keyword for content in files for keyword in keywords_of(content)):
+        for keyword in _keywords_in(files):
             if keyword.name == "ELGEN":
                 return None
             kind = ELEMENT.match(_joined(keyword.parameters.get("TYPE", ""))) if keyword.name == "ELEMENT" else None
@@ -176,13 +192,8 @@ class AbaqusDeck(DeckFormat):
         return MeshSize(counts[max(counts)], max(counts)) if counts else None
 
     def is_axisymmetric(self, files: Sequence[bytes]) -> bool:
-        types = (
-            _joined(keyword.parameters.get("TYPE", ""))
-            for content in files
-            for keyword in keywords_of(content)
-            if keyword.name == "ELEMENT"
-        )
-        return any(kind.startswith("CAX") for kind in types)
+        elements = (keyword for keyword in _keywords_in(files) if keyword.name == "ELEMENT")
+        return any(_joined(keyword.parameters.get("TYPE", "")).startswith("CAX") for keyword in elements)
 
 
 def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:
@@ -230,3 +241,99 @@ def _members(keyword: Keyword) -> tuple[set[int], set[str]]:
         start, stop, step = (*map(int, row), 1)[:3]
         numbers |= set(range(start, stop + 1, step))
     return numbers, set()
+
+
+SCRIPT = Path(__file__).with_name("odb_table.py")
+SUFFIX = ".tissuq.json"
+"""What the name of the table ends in."""
+LAST_LINES = 5
+"""Lines of what Abaqus said that a message shows."""
+
+
+class AbaqusResults(ResultFile):
+    """Abaqus's output database; stresses are those extrapolated to nodes, averaged over the elements that meet there.
+
+    Its strains are logarithmic ones, not Green's. Sets are those in the file, also of an instance
+    (``PART-1-1.TOP``).
+    """
+
+    name = "abaqus"
+    suffixes = (".odb",)
+    requests = {  # noqa: RUF012  (as in the base class)
+        "U": r"*OUTPUT, FIELD\n*NODE OUTPUT, NSET={set}\n U",
+        "RF": r"*OUTPUT, FIELD\n*NODE OUTPUT, NSET={set}\n RF",
+        "S": r"*OUTPUT, FIELD\n*ELEMENT OUTPUT\n S",
+    }
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        return np.zeros(0, dtype=np.int64)
+
+    @cached_property
+    def node_sets(self) -> Mapping[str, Collection[int]]:
+        """The names of the sets in the file, of which the members stay in it."""
+        return dict.fromkeys(self._table(())["sets"], ())
+
+    def field(self, kind: str) -> Values | None:
+        return self.of_set(kind, ALL, "")
+
+    def of_set(self, kind: str, set_name: str, how: str) -> Values | None:
+        if kind not in self.requests:
+            return None
+        request = f"{kind}@{set_name}"
+        fields = self._table((request,))["fields"]
+        if request not in fields:
+            raise InputError(unknown_set(set_name, self.node_sets))
+        field = fields[request]
+        if field is None:
+            return None
+        width = len(TENSOR) if kind == "S" else 3
+        is_within = self.results.reach(np.array(field["times"]))
+        rows = [[row or [np.nan] * width for row in rows] for rows in field["rows"]]
+        return Values(np.array(field["times"])[is_within], np.array(rows, dtype=np.float64)[is_within])
+
+    def _table(self, requests: tuple[str, ...]) -> Mapping[str, Any]:
+        """Return the table, written anew where it lacks a request."""
+        target = self.path.with_name(self.path.name + SUFFIX)
+        stored = _stored(target)
+        if stored is None or not set(requests) <= set(stored["asked"]):
+            all_requests = sorted({*requests, *(f"{kind}@{name}" for kind, name in self.results.asked)})
+            self._write(target, all_requests)
+            written = _stored(target) or {"sets": [], "fields": {}}
+            stored = {**written, "asked": all_requests}
+            target.write_text(json.dumps(stored), encoding="utf-8")
+        return stored
+
+    def _write(self, target: Path, requests: list[str]) -> None:
+        program, *words = shlex.split(self.results.program) or ["abaqus"]
+        command = [
+            shutil.which(program) or program,
+            *words,
+            "python",
+            str(SCRIPT),
+            self.path.name,
+            target.name,
+            *requests,
+        ]
+        advice = "Name the program that opens it with --abaqus 'abaqus', or give the quantity by a function of yours."
+        try:
+            done = subprocess.run(  # noqa: S603  (the user's program, without a shell)
+                command, cwd=self.path.parent, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+            )
+        except OSError as error:
+            raise InputError(
+                f"{self.label} cannot be opened: there is no program '{program}' to run. {advice}"
+            ) from error
+        if done.returncode or not target.is_file():
+            lines = f"{done.stdout}\n{done.stderr}".strip().splitlines()[-LAST_LINES:]
+            said = "".join(f"\n    {line}" for line in lines)
+            raise InputError(f"{self.label} cannot be opened by '{program} python'. {advice} It said:{said}")
+
+
+def _stored(target: Path) -> dict[str, Any] | None:
+    """Return what is in a table; None where there is none, or it was cut short."""
+    try:
+        table = json.loads(target.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return {"asked": (), **table} if isinstance(table, dict) and "fields" in table else None

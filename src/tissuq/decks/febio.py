@@ -44,8 +44,7 @@ class FEBioDeck(DeckFormat):
         return b"<febio_spec" in content[:2000]
 
     def includes(self, content: bytes) -> list[str]:
-        parsed = _Parsed(content)
-        return parsed.includes
+        return _Parsed(content).includes
 
     def materials(self, content: bytes) -> list[DeckMaterial]:
         return _Parsed(content).materials

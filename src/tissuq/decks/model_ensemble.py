@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.decks.model_run import ModelRun
+from tissuq.decks.result_file import SAME_TIME
 from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, FINE_MESH, MATERIAL_ONLY, MIN_DRAWS
 from tissuq.finite_elements.spread import (
@@ -33,8 +34,6 @@ FloatArray = NDArray[np.float64]
 
 TIMES = 41
 """Common times of curves whose solver chose its increments draw by draw."""
-SAME_TIME = 1e-5
-"""Relative difference of times that are the same in files with six digits."""
 MIN_VALUE = 1e-3
 """Share of its largest value from which the relative change of a quantity on a finer mesh is used."""
 MIN_SHARE_BEYOND = 0.02

@@ -19,13 +19,12 @@ import numpy as np
 from tissuq.decks.calculix_results import CalculiXResults
 from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
-from tissuq.decks.quantity import Component, Quantity, Results
-from tissuq.decks.result_file import ALL, unknown_set
+from tissuq.decks.quantity import Component, Quantity
+from tissuq.decks.result_file import ALL, Results, unknown_set
 from tissuq.decks.solver import LOG, CalculiXSolver, Solver
 from tissuq.errors import InputError
 
-__all__ = [
-    "DONE", "FIELDS", "USUALLY", "ModelRun", "SolverRun", "carried_out", "check_sets", "clear_unfinished",
+__all__ = [ "FIELDS", "USUALLY", "ModelRun", "SolverRun", "carried_out", "check_sets", "clear_unfinished",
     "problem_of", "sets_of",
 ]  # fmt: skip
 

@@ -16,15 +16,7 @@ from tissuq.decks.result_file import ALL, TENSOR, Results, result_files
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import UserCode
 
-__all__ = [
-    "Component",
-    "Curve",
-    "FunctionQuantity",
-    "Quantity",
-    "Results",
-    "parse_quantity",
-    "von_mises",
-]
+__all__ = ["Component", "Curve", "FunctionQuantity", "Quantity", "parse_quantity", "von_mises"]
 
 FloatArray = NDArray[np.float64]
 
@@ -32,12 +24,7 @@ SPECIFICATION = re.compile(r"(?P<component>[A-Za-z]+\d*)(@(?P<set>[^:]+))?(:(?P<
 HOW_TO_WRITE = "write NAME=RF3@SET, NAME=U2@SET:max, NAME=S11@SET, NAME=MISES@SET:max, or NAME=file.py:function"
 OWN_FUNCTION = "give it by a function of yours, NAME=file.py:function"
 AXES = ("1", "2", "3")
-REDUCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "sum": lambda values: values.sum(axis=1),
-    "mean": lambda values: values.mean(axis=1),
-    "min": lambda values: values.min(axis=1),
-    "max": lambda values: values.max(axis=1),
-}
+REDUCTIONS: dict[str, Callable[..., FloatArray]] = {"sum": np.sum, "mean": np.mean, "min": np.min, "max": np.max}
 
 
 class Curve(NamedTuple):
@@ -148,12 +135,12 @@ class Component(Quantity):
         reduce = REDUCTIONS[self.how]
         columns = np.moveaxis(values, -1, 0)
         if self.component:
-            return reduce(columns[KINDS[self.kind].components.index(self.component)])
+            return reduce(columns[KINDS[self.kind].components.index(self.component)], axis=1)
         if self.kind == "S":
-            return reduce(von_mises(*columns))
+            return reduce(von_mises(*columns), axis=1)
         if self.how == "sum":
             return np.asarray(np.linalg.norm(values.sum(axis=1), axis=1))
-        return reduce(np.linalg.norm(values, axis=2))
+        return reduce(np.linalg.norm(values, axis=2), axis=1)
 
 
 def von_mises(*components: FloatArray) -> FloatArray:

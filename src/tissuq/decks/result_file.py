@@ -28,7 +28,7 @@ TENSOR = ("11", "22", "33", "12", "13", "23")
 AS_TENSOR = [0, 1, 2, 3, 5, 4]
 """Places of these in a tensor that a program writes as XX, YY, ZZ, XY, YZ, XZ."""
 SAME_TIME = 1e-5
-"""Relative difference of times that are the same."""
+"""Relative difference of times that are the same in files with six digits."""
 
 MOST_NAMES = 20
 """Sets that a message lists."""

@@ -143,9 +143,7 @@ def on_figure(figure: Figure, count: int, columns: int, *, has_strips: bool = Fa
 
 
 @contextmanager
-def panels(
-    ax: Any, count: int, *, has_strips: bool = False, height: float = PANEL_HEIGHT, width: float | None = None
-) -> Iterator[Panels]:
+def panels(ax: Any, count: int, *, has_strips: bool = False, height: float = PANEL_HEIGHT) -> Iterator[Panels]:
     """Give a user's axes, or those of a new figure in the style of a paper, which `matplotlib.pyplot` shows.
 
     Parameters
@@ -156,9 +154,7 @@ def panels(
     has_strips : bool
         Whether a new figure has a strip beneath each panel.
     height : float
-        Of a panel of a new figure, inches.
-    width : float, optional
-        Of a new figure, inches; a column of a paper for one panel, or a page, unless given.
+        Of a panel of a new figure, inches, which is as wide as a column of a paper for one panel, else as a page.
 
     Raises
     ------
@@ -183,7 +179,7 @@ def panels(
     down = ceil(count / columns)
     tall = down * (height + STRIP_HEIGHT * has_strips) + LEGEND_HEIGHT
     with rc_context(PAPER):
-        figure = plt.figure(figsize=(width or (COLUMN if columns == 1 else PAGE), tall))
+        figure = plt.figure(figsize=(COLUMN if columns == 1 else PAGE, tall))
         try:
             yield on_figure(figure, count, columns, has_strips=has_strips)
         except BaseException:

@@ -142,12 +142,11 @@ def density(
     level: float = 0.0,
     top: float | None = None,
     color: str = BAND,
-    strength: float = 0.35,
     label: str = "",
 ) -> None:
     """Draw a density as an area above a level; as tall as ``top``, where that is said."""
     scaled = height if top is None else top * height / height.max()
-    axis.fill_between(x, level, level + scaled, color=color, alpha=strength, lw=0, label=label)
+    axis.fill_between(x, level, level + scaled, color=color, alpha=0.35, lw=0, label=label)
 
 
 def heat(

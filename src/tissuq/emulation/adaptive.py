@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator, emulate, runs_needed
-from tissuq.emulation.length_scales import Kernel, Trend
+from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
 from tissuq.emulation.runs import ForwardRuns, PointSet, space_filling
 from tissuq.errors import InputError

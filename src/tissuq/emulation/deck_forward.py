@@ -33,7 +33,7 @@ from tissuq.experiments.units import FORCE, LENGTH, PRESSURE
 from tissuq.export import CardFormat, Cards, CardSettings, FECode, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
 
-__all__ = ["DeckForward", "check_unit_of_function", "conversion", "units_of"]
+__all__ = ["DeckForward", "check_unit_of_function", "conversion"]
 
 FloatArray = NDArray[np.float64]
 

@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.emulation.kriging import Kriging, fitted, leave_one_out, moments
-from tissuq.emulation.length_scales import Kernel, LengthScales, Mode, Trend, trend_basis
+from tissuq.emulation.kriging import (
+    Kernel,
+    Kriging,
+    LengthScales,
+    Mode,
+    Trend,
+    fitted,
+    leave_one_out,
+    moments,
+    trend_basis,
+)
 from tissuq.emulation.output_basis import OutputBasis, basis_of, has_signs, output_moments
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError

@@ -20,7 +20,6 @@ from tissuq.errors import ConvergenceError, InputError
 from tissuq.mechanics.user_law import UserCode
 
 __all__ = [
-    "DEFAULT_URL",
     "CallableForward",
     "FileForward",
     "Forward",

@@ -14,9 +14,8 @@ from jax.scipy.linalg import block_diag, cho_solve, solve_triangular
 from numpy.typing import NDArray
 
 from tissuq.emulation.emulator import Emulator, emulated
-from tissuq.emulation.length_scales import Kernel, Trend
-from tissuq.emulation.prior_correlation import PriorCorrelation
-from tissuq.emulation.problem import Problem, symbol_of
+from tissuq.emulation.kriging import Kernel, Trend
+from tissuq.emulation.problem import PriorCorrelation, Problem, symbol_of
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.priors import Prior

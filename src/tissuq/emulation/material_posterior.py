@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.stability import measured_range
-from tissuq.emulation.problem import Problem
-from tissuq.emulation.sampling import SampledPosterior
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
@@ -25,6 +24,10 @@ from tissuq.parameters.priors import Prior
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Solver
+
+if TYPE_CHECKING:
+    from tissuq.emulation.problem import Problem
+    from tissuq.emulation.sampling import SampledPosterior
 
 __all__ = ["card_material", "check_material", "material_posterior", "points_of_range"]
 
@@ -42,12 +45,12 @@ def material_posterior(
     material: str | Material,
     stretch: tuple[float, float],
     *,
-    mode: str | LoadingMode = "uniaxial",
-    unit: str = "MPa",
+    mode: str,
+    unit: str,
     runs: int,
     seed: int,
 ) -> Posterior:
-    """Return the draws of a calibration as the posterior of a material, without discrepancy.
+    """Return the draws of a calibration as the posterior of a material, as `Calibration.posterior_of` says.
 
     Parameters
     ----------
@@ -55,14 +58,8 @@ def material_posterior(
         What was calibrated.
     sampled : SampledPosterior
         The draws of its parameters.
-    material : str or Material
-        The law in the forward model, whose parameters are all among the calibrated ones.
-    stretch : (float, float)
-        Smallest and largest stretch in the forward model: the range in which the material counts as calibrated.
-    mode : str or LoadingMode
-        The loading mode of that range; of one control.
-    unit : str
-        Unit of stress of the forward model's parameters.
+    material, stretch, mode, unit
+        As of `Calibration.posterior_of`.
     runs : int
         Of the forward model.
     seed : int
@@ -82,8 +79,7 @@ def material_posterior(
     experiment = _experiment(law, draws.reshape(chains * count, -1), loading, stretch).labelled(
         name="calibration", source="mean of a calibration of a forward model: nothing was measured", stress_unit=unit
     )
-    noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
-    model = StatisticalModel(experiment, law, NoDiscrepancy(), noise, priors)
+    model = _model(experiment, law, priors)
     by_symbol = {symbol: draws[:, :, k].ravel() for k, symbol in enumerate(symbols)}
     settings, linear = (
         np.array([by_symbol[symbol] for symbol in group]).reshape(-1, chains * count).T
@@ -117,8 +113,7 @@ def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float
         When the range is none.
     """
     experiment = _experiment(law, np.array([values]), loading_mode(mode), stretch)
-    noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
-    model = StatisticalModel(experiment, law, NoDiscrepancy(), noise)
+    model = _model(experiment, law)
     ranges = {loading.name: measured_range(experiment, loading) for loading in curve_modes()}
     return Ensemble((EnergyDraw(0, ((law, values),), None),), model, (), 1, ranges)
 
@@ -130,6 +125,12 @@ def _experiment(
     loading, points = points_of_range(law, loading, stretch)
     stresses = [engineering_stress(law, path, points, values).mean(axis=0) for path in loading.paths]
     return Experiment(loading, points, np.column_stack(stresses) if len(stresses) > 1 else stresses[0])
+
+
+def _model(experiment: Experiment, law: Material, priors: Mapping[str, Prior] | None = None) -> StatisticalModel:
+    """Return the model of a law, all but without noise, of what stands for measurements."""
+    noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
+    return StatisticalModel(experiment, law, NoDiscrepancy(), noise, priors or {})
 
 
 def points_of_range(

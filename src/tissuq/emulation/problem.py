@@ -1,26 +1,25 @@
-"""The calibration problem: measurements, priors, discrepancy and noise."""
+"""The calibration problem: measurements, priors and how they go together, discrepancy and noise."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import inf, isfinite
 from numbers import Real
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.emulation.prior_correlation import PriorCorrelation, correlated
 from tissuq.errors import InputError, ModelError
 from tissuq.model.discrepancy import Discrepancy, GaussianProcess, NoDiscrepancy, PinnedProcess
 from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.parameter import Parameter
-from tissuq.parameters.priors import Flat, Prior
+from tissuq.parameters.priors import Flat, LogNormal, Normal, Prior
 
-__all__ = ["DISCREPANCIES", "Method", "Problem", "is_far", "pose", "symbol_of"]
+__all__ = ["DISCREPANCIES", "Method", "PriorCorrelation", "Problem", "correlated", "is_far", "pose", "symbol_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +32,71 @@ DISCREPANCIES: dict[str, type[Discrepancy]] = {
 """Discrepancies that need no material."""
 PROBABILITIES = 1e-300, 1 - 2 * np.finfo(float).epsneg
 """The least and the largest probability at which a prior's quantile is finite."""
+
+
+@dataclass(frozen=True)
+class PriorCorrelation:
+    """The correlation of standard scores: of normal parameters, and of the logarithms of log-normal ones.
+
+    The parameters on that line are jointly normal, so that their density is that of the priors times
+    exp(-z' (R^-1 - I) z / 2) / sqrt(det R) with z their scores.
+
+    Attributes
+    ----------
+    priors : tuple of Prior
+        Of all parameters of the forward model, in their order.
+    matrix : tuple of tuples of float
+        R.
+    """
+
+    priors: tuple[Prior, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+    def scores(self, independent: FloatArray) -> FloatArray:
+        """Return correlated scores (N, d) of independent ones (N, d)."""
+        return np.asarray(independent @ np.linalg.cholesky(np.array(self.matrix)).T)
+
+    def log_density(self, values: Sequence[Any], arrays: Any) -> Any:
+        """Return the log of the factor beside the priors at parameters (d,); ``arrays`` is NumPy or jax.numpy."""
+        size = len(self.matrix)
+        weights = np.linalg.inv(self.matrix) - np.eye(size)
+        is_correlated = np.abs(weights).sum(axis=1) > 0
+        pairs = zip(self.priors, values, is_correlated, strict=True)
+        scores = arrays.stack([_score(prior, value, arrays) if used else 0.0 * value for prior, value, used in pairs])
+        return -0.5 * scores @ weights @ scores - 0.5 * np.linalg.slogdet(self.matrix)[1]
+
+
+def correlated(priors: Mapping[str, Prior], correlations: Mapping[tuple[str, str], float]) -> PriorCorrelation | None:
+    """Return the correlation of priors from that of pairs; None where there is none.
+
+    Raises
+    ------
+    InputError
+        When a pair is not one of two parameters with normal or log-normal priors, or the pairs contradict each other.
+    """
+    if not correlations:
+        return None
+    symbols, matrix = list(priors), np.eye(len(priors))
+    for pair, value in correlations.items():
+        unknown = [symbol for symbol in pair if symbol not in priors]
+        if len(pair) != 2 or pair[0] == pair[1] or unknown:
+            raise InputError(
+                f"the prior correlation of {', '.join(pair)} is not one of two parameters of the model, which are "
+                f"{', '.join(symbols)}."
+            )
+        for symbol in pair:
+            if not _is_whole(priors[symbol]):
+                raise InputError(
+                    f"the prior of {symbol}, {priors[symbol]}, can have no correlation: only normal priors without "
+                    "bounds and log-normal ones can."
+                )
+        if not -1 < value < 1:
+            raise InputError(f"the prior correlation of {', '.join(pair)} must lie between -1 and 1, not at {value:g}.")
+        i, j = (symbols.index(symbol) for symbol in pair)
+        matrix[i, j] = matrix[j, i] = value
+    if np.linalg.eigvalsh(matrix)[0] <= 1e-9:
+        raise InputError("the prior correlations contradict each other: no parameters have them together.")
+    return PriorCorrelation(tuple(priors.values()), tuple(map(tuple, matrix.tolist())))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +234,21 @@ def symbol_of(symbol: str, quantity: str) -> str:
 def is_far(control: FloatArray, zero_load: float) -> bool:
     """Return whether a process that is pinned at zero load is as good as free at all controls (n,)."""
     return bool(np.abs(control - zero_load).min() > np.ptp(control))
+
+
+def _is_whole(prior: Prior) -> bool:
+    """Return whether a prior is a normal one without bounds, or a log-normal one."""
+    if isinstance(prior, Normal):
+        return prior.support == (-inf, inf)
+    return isinstance(prior, LogNormal) and prior.support == (0.0, inf)
+
+
+def _score(prior: Prior, value: Any, arrays: Any) -> Any:
+    """Return how many standard deviations a value is from the middle, on the line of a normal or log-normal prior."""
+    if isinstance(prior, LogNormal):
+        return (arrays.log(value) - np.log(prior.median)) / prior.sd_log
+    assert isinstance(prior, Normal)  # noqa: S101 (others have no correlation)
+    return (value - prior.mean) / prior.sd
 
 
 def _columns(

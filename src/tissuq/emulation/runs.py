@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.forward import Forward, UnreadableError
-from tissuq.emulation.prior_correlation import PriorCorrelation
+from tissuq.emulation.problem import PriorCorrelation
 from tissuq.errors import InputError
 from tissuq.parameters.priors import Prior
 

@@ -16,6 +16,7 @@ from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal, systematic
+from tissuq.parameters.priors import Prior
 
 __all__ = ["SampledPosterior", "sample_posterior"]
 
@@ -40,7 +41,8 @@ class SampledPosterior:
 
     Parameters
     ----------
-    symbols : tuple of str
+    priors : mapping of str to Prior
+        Of all parameters.
     values : (N, D) array
     weights : (N,) array
         Weights, whose sum is one.
@@ -56,7 +58,7 @@ class SampledPosterior:
         Equally weighted draws.
     """
 
-    symbols: tuple[str, ...]
+    priors: Mapping[str, Prior]
     values: FloatArray
     weights: FloatArray
     method: str
@@ -67,17 +69,16 @@ class SampledPosterior:
     log_evidence: float | None
     log_evidence_error: float | None
     draws: FloatArray
-    supports: tuple[tuple[float, float], ...]
 
     @cached_property
     def marginals(self) -> dict[str, Marginal]:
         """The marginal posterior of every parameter."""
-        columns = zip(self.symbols, self.values.T, self.supports, strict=True)
-        return {symbol: marginal_of_points(column, self.weights, ends) for symbol, column, ends in columns}
+        columns = zip(self.priors.items(), self.values.T, strict=True)
+        return {symbol: marginal_of_points(column, self.weights, prior.support) for (symbol, prior), column in columns}
 
     def thinned(self, count: int) -> FloatArray:
         """Return equally probable draws (count, D) of all parameters."""
-        flat = self.draws.reshape(-1, len(self.symbols))
+        flat = self.draws.reshape(-1, len(self.priors))
         return np.asarray(flat[np.linspace(0, len(flat) - 1, count).round().astype(int)])
 
 
@@ -121,7 +122,7 @@ def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
     values = problem.values_of(scores)
     order = np.random.default_rng([seed, 47]).permutation(systematic(weights[None], CHAINS * DRAWS)[0])
     return SampledPosterior(
-        symbols=problem.symbols,
+        priors=problem.priors,
         values=values,
         weights=weights,
         method="importance",
@@ -132,7 +133,6 @@ def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
         log_evidence=float(logs.max() + np.log(mean_weight)),
         log_evidence_error=float(np.sqrt(max(1 / effective_points - 1 / count, 0.0))),
         draws=values[order].reshape(CHAINS, DRAWS, -1),
-        supports=tuple(prior.support for prior in problem.priors.values()),
     )
 
 
@@ -246,7 +246,7 @@ def _by_nuts(likelihood: Likelihood, seed: int, search: SampledPosterior | None)
     values = chains.values.reshape(-1, len(problem.symbols))
     sizes = np.minimum(chains.ess_bulk, chains.ess_tail)
     return SampledPosterior(
-        symbols=problem.symbols,
+        priors=problem.priors,
         values=values,
         weights=np.full(len(values), 1 / len(values)),
         method="nuts",
@@ -257,5 +257,4 @@ def _by_nuts(likelihood: Likelihood, seed: int, search: SampledPosterior | None)
         log_evidence=None,
         log_evidence_error=None,
         draws=chains.values,
-        supports=tuple(prior.support for prior in problem.priors.values()),
     )

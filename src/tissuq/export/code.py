@@ -35,7 +35,6 @@ from tissuq.export.laws import (
     matrix_and_fibres,
     parts_of,
     sum_of,
-    summands_of,
 )
 from tissuq.export.projection import Projection, projections
 from tissuq.export.states import moduli
@@ -203,8 +202,8 @@ class FECode(CardFormat):
         InputError
             Which names the codes that have one.
         """
-        summands = list(summands_of(material, np.ones((1, len(material.parameters)))))
-        law, fibres = sum_of(summands), fibres_among(summands)
+        laws = Law(material, np.ones((1, len(material.parameters)))).summands
+        law, fibres = sum_of(laws), fibres_among(laws)
         if not self._has_card(law, fibres):
             raise InputError(self._why_no_card(material.name, law, fibres))
 
@@ -215,7 +214,7 @@ class FECode(CardFormat):
     def _refuse_fibres(self, ensemble: Ensemble, law: Law | None, fibres: Law | None) -> NoReturn:
         """Refuse draws with fibres that have no card here."""
         reason = self._why_no_card(ensemble[0].parts[0][0].name, law, fibres)
-        without_energy = sum_of(list(parts_of(ensemble)))
+        without_energy = sum_of(parts_of(ensemble))
         if without_energy is not None and self.form_of(without_energy.material) is not None:
             reason += (
                 " Or fit without the free energy of the discrepancy beside the fibres (--discrepancy none, in Python "

@@ -15,7 +15,7 @@ from tissuq.export.states import PrincipalStates, SeenStates, are_stable, mode_s
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = ["MIN_RELATIVE_STRESS", "REACHES", "DrawStresses", "Judged", "within"]
+__all__ = ["REACHES", "DrawStresses", "Judged", "within"]
 
 FloatArray = NDArray[np.float64]
 
@@ -78,13 +78,8 @@ class DrawStresses:
     @cached_property
     def stability_states(self) -> StabilityStates:
         """The states in which laws are to be stable, up to the last of `REACHES`."""
-        return StabilityStates(self.largest_invariants)
-
-    @property
-    def largest_invariants(self) -> tuple[float, float]:
-        """The largest I1 - 3 and I2 - 3 of the states."""
         largest_1, largest_2 = self.ensemble.most
-        return REACHES[-1] * largest_1, REACHES[-1] * largest_2
+        return StabilityStates((REACHES[-1] * largest_1, REACHES[-1] * largest_2))
 
     @cached_property
     def wanted_stiffness(self) -> FloatArray:

@@ -15,12 +15,10 @@ from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, Rivlin, St
 __all__ = [
     "CALCULIX_PREFIX",
     "FIBRE_AXES",
-    "QUADRATIC_RATE",
     "FibreForm",
     "check_fibres",
     "directions",
     "fibre_sentences",
-    "fibres_of_form",
     "initial_stiffness",
 ]
 

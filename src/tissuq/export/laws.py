@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +40,6 @@ __all__ = [
     "parts_of",
     "sum_of",
     "summands",
-    "summands_of",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -73,6 +71,13 @@ class Law:
         draws = tuple(EnergyDraw(number, ((self.material, row),), None) for number, row in enumerate(rows))
         return replace(like, draws=draws)
 
+    @property
+    def summands(self) -> list[Law]:
+        """The laws that it is the sum of, or itself."""
+        materials = summands(self.material)
+        ends = np.cumsum([len(material.parameters) for material in materials])[:-1]
+        return list(map(Law, materials, np.split(self.values, ends, axis=1)))
+
     def plus(self, law: Law) -> Law:
         """Return the sum of both."""
         return Law(MaterialSum.of(self.material, law.material), np.hstack([self.values, law.values]))
@@ -89,51 +94,47 @@ def exact_law(ensemble: Ensemble) -> Law | None:
     Polynomials add up to a Rivlin polynomial, Ogden terms (with those of Mooney and Rivlin, if any) to an Ogden sum;
     any other material stands alone. Fibres are added to a polynomial.
     """
-    return None if any(draw.discrepancy is not None for draw in ensemble) else sum_of(list(parts_of(ensemble)))
+    return None if any(draw.discrepancy is not None for draw in ensemble) else sum_of(parts_of(ensemble))
 
 
-def sum_of(summands: list[tuple[Material, FloatArray]]) -> Law | None:
-    """Return the one law that materials with values (N, k) add up to, as `exact_law` says, if there is one."""
-    fibres = [summand for summand in summands if not summand[0].is_isotropic]
-    if fibres:
-        return _with_fibres([summand for summand in summands if summand[0].is_isotropic], fibres)
-    if all(isinstance(material, POLYNOMIALS) for material, _ in summands):
-        return _polynomial(summands)
-    terms = [_ogden_terms(material, values) for material, values in summands]
+def sum_of(laws: Sequence[Law]) -> Law | None:
+    """Return the one law that laws add up to, as `exact_law` says, if there is one."""
+    matrix, fibres = [law for law in laws if law.material.is_isotropic], fibres_among(laws)
+    if all(isinstance(law.material, POLYNOMIALS) for law in matrix):
+        return _polynomial(matrix) if fibres is None else _polynomial(matrix).plus(fibres)
+    if fibres is not None:
+        return None
+    terms = [_ogden_terms(law.material, law.values) for law in laws]
     if all(term is not None for term in terms):
         moduli, exponents = (np.hstack([term[k] for term in terms if term is not None]) for k in (0, 1))
         return Law(Ogden(moduli.shape[1]), np.hstack([moduli, exponents]))
-    return Law(*summands[0]) if len(summands) == 1 else None
-
-
-def _with_fibres(matrix: list[tuple[Material, FloatArray]], fibres: list[tuple[Material, FloatArray]]) -> Law | None:
-    """Return the sum of a polynomial and fibres, if they are one."""
-    if not all(isinstance(material, POLYNOMIALS) for material, _ in matrix):
-        return None
-    return reduce(Law.plus, [Law(*law) for law in fibres], _polynomial(matrix))
+    return laws[0] if len(laws) == 1 else None
 
 
 def matrix_and_fibres(ensemble: Ensemble) -> tuple[Ensemble, Law | None]:
     """Return draws without their fibres, discrepancy included, and the sum of these, if there are any."""
-    terms = list(parts_of(ensemble))
-    matrix = [term for term in terms if term[0].is_isotropic]
+    laws = parts_of(ensemble)
+    matrix = [law for law in laws if law.material.is_isotropic]
     draws = (
-        replace(draw, parts=tuple((material, tuple(values[row])) for material, values in matrix))
+        replace(draw, parts=tuple((law.material, tuple(law.values[row])) for law in matrix))
         for row, draw in enumerate(ensemble)
     )
-    return replace(ensemble, draws=tuple(draws)), fibres_among(terms)
+    return replace(ensemble, draws=tuple(draws)), fibres_among(laws)
 
 
-def fibres_among(terms: list[tuple[Material, FloatArray]]) -> Law | None:
-    """Return the sum of the fibres among materials with values (N, k), if there are any."""
-    fibres = [Law(*term) for term in terms if not term[0].is_isotropic]
+def fibres_among(laws: Sequence[Law]) -> Law | None:
+    """Return the sum of the fibres among laws, if there are any."""
+    fibres = [law for law in laws if not law.material.is_isotropic]
     return reduce(Law.plus, fibres) if fibres else None
 
 
-def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:
-    """Return the materials that draws are sums of, one by one, with their values (N, k)."""
-    for index, (material, _) in enumerate(ensemble[0].parts):
-        yield from summands_of(material, np.array([draw.parts[index][1] for draw in ensemble]))
+def parts_of(ensemble: Ensemble) -> list[Law]:
+    """Return the laws that draws are sums of, one by one."""
+    parts = (
+        Law(material, np.array([draw.parts[index][1] for draw in ensemble]))
+        for index, (material, _) in enumerate(ensemble[0].parts)
+    )
+    return [law for part in parts for law in part.summands]
 
 
 def summands(material: Material) -> tuple[Material, ...]:
@@ -141,18 +142,11 @@ def summands(material: Material) -> tuple[Material, ...]:
     return material.summands if isinstance(material, MaterialSum) else (material,)
 
 
-def summands_of(material: Material, values: FloatArray) -> Iterator[tuple[Material, FloatArray]]:
-    """Return the materials that one is the sum of, with their values (N, k)."""
-    materials = summands(material)
-    ends = pairwise(accumulate((len(material.parameters) for material in materials), initial=0))
-    yield from ((material, values[:, start:end]) for material, (start, end) in zip(materials, ends, strict=True))
-
-
-def _polynomial(summands: list[tuple[Material, FloatArray]]) -> Law:
+def _polynomial(laws: Sequence[Law]) -> Law:
     """Return the sum of polynomials, its terms by their order and then by the power of I1 - 3, the highest first."""
     coefficients: dict[str, FloatArray] = {}
-    for material, values in summands:
-        for parameter, column in zip(material.parameters, values.T, strict=True):
+    for law in laws:
+        for parameter, column in zip(law.material.parameters, law.values.T, strict=True):
             coefficients[parameter.symbol] = coefficients.get(parameter.symbol, 0.0) + column
     terms = sorted(coefficients, key=lambda term: (int(term[1]) + int(term[2]), int(term[2])))
     return Law(Rivlin(tuple(terms)), np.stack([coefficients[term] for term in terms], axis=1))
@@ -286,8 +280,8 @@ class MixtureForm(Form):
 
     def constants(self, material: Material, values: Sequence[float]) -> Constants:
         constants: Constants = {}
-        for form, (summand, numbers) in zip(self.summands, summands_of(material, np.array([values])), strict=True):
-            of_summand = form.constants(summand, tuple(map(float, numbers[0])))
+        for form, law in zip(self.summands, Law(material, np.array([values])).summands, strict=True):
+            of_summand = form.constants(law.material, tuple(map(float, law.values[0])))
             constants |= {f"{form.keyword}_{name}": value for name, value in of_summand.items()}
         return constants
 

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.export.constrained_fit import Inequalities, fit_within, least_squares
 from tissuq.export.draw_stresses import DrawStresses
-from tissuq.export.stability_rows import StabilityRows
+from tissuq.export.stability_rows import Inequalities, StabilityRows
 
-__all__ = ["WANTED_ERROR", "Candidate", "nearest_values", "squared_distance"]
+__all__ = [
+    "WANTED_ERROR",
+    "Candidate",
+    "constrained_least_squares",
+    "fit_within",
+    "least_squares",
+    "nearest_values",
+    "squared_distance",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -21,6 +29,10 @@ WANTED_ERROR = 0.01
 """Largest relative error of a stress inside with which a card is content."""
 MAX_RMS_RATIO = 1.1
 """Where that is out of reach: the root mean square error inside may be so many times the smallest."""
+MIN_SINGULAR_VALUE = 1e-12
+"""Singular values below that share of the largest count as zero."""
+MAX_ROUNDS = 40
+"""Largest number of times that inequalities are added."""
 
 
 class Candidate(NamedTuple):
@@ -100,3 +112,98 @@ def squared_distance(candidate: Candidate, weights: FloatArray, wanted: FloatArr
     residual = weights[:, None] * (wanted - candidate.columns @ start)
     basis = np.linalg.qr(columns / np.maximum(np.abs(columns).max(axis=0, initial=0.0), 1e-300))[0]
     return float((residual**2).sum() - ((basis.T @ residual) ** 2).sum())
+
+
+def constrained_least_squares(columns: FloatArray, wanted: FloatArray, inequalities: Inequalities) -> FloatArray | None:
+    """Return the x (k,) that minimises |columns x - wanted| among those with rows x >= bounds, or None.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+    wanted : (n,) array
+    inequalities : ((m, k) array, (m,) array)
+
+    Returns
+    -------
+    (k,) array or None
+        None where none exists, or none is found.
+
+    References
+    ----------
+    Lawson & Hanson (1974), Solving least squares problems, chapter 23: least distance programming by nonnegative least
+    squares.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> nearest = constrained_least_squares(np.eye(2), np.array([1.0, -1.0]), (np.eye(2), np.zeros(2)))
+    >>> np.allclose(nearest, [1, 0])
+    True
+    """
+    from scipy.optimize import nnls
+
+    rows, bounds = inequalities
+    basis, free = _orthonormal(columns, wanted)
+    transformed = rows @ basis
+    missing = bounds - transformed @ free
+    length = np.linalg.norm(transformed, axis=1)
+    if ((length == 0) & (missing > 0)).any():
+        return None
+    length[length == 0] = 1.0
+    transformed, missing = transformed / length[:, None], missing / length
+    scale = missing.max()
+    if scale <= 0:
+        return np.asarray(basis @ free)
+    dual = np.vstack([transformed.T, missing / scale])
+    target = np.zeros(len(dual))
+    target[-1] = 1.0
+    try:
+        multipliers, _ = nnls(dual, target, maxiter=10 * dual.shape[1] + 100)
+    except RuntimeError:  # it has not converged
+        return None
+    residual = dual @ multipliers - target
+    if -residual[-1] < 1e-12:
+        return None
+    return np.asarray(basis @ (free - scale * residual[:-1] / residual[-1]))
+
+
+def least_squares(columns: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the x (k,) that minimises |columns x - wanted|, of columns (n, k) of any sizes."""
+    basis, free = _orthonormal(columns, wanted)
+    return np.asarray(basis @ free)
+
+
+def _orthonormal(columns: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a basis (k, r) whose columns have orthonormal images, and the coordinates (r,) of what is wanted."""
+    size = np.abs(columns).max(axis=0, initial=0.0)
+    size[size == 0] = 1.0
+    left_vectors, singular, right_vectors = np.linalg.svd(columns / size, full_matrices=False)
+    used = singular > MIN_SINGULAR_VALUE * singular.max(initial=0.0)
+    return right_vectors[used].T / singular[used] / size[:, None], left_vectors[:, used].T @ wanted
+
+
+def fit_within(
+    columns: FloatArray, wanted: FloatArray, broken: Callable[[FloatArray], Inequalities]
+) -> FloatArray | None:
+    """Return the least-squares solution (k,) that breaks no inequality, or None where that is not found.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+    wanted : (n,) array
+    broken : callable
+        From a solution the inequalities that it breaks, none where it is good. They are added until there are none,
+        which also finds the solution of convex conditions that are no finite number of inequalities (Kelley's cutting
+        planes).
+    """
+    rows, bounds = np.zeros((0, columns.shape[1])), np.zeros(0)
+    solution: FloatArray | None = least_squares(columns, wanted)
+    for _ in range(MAX_ROUNDS):
+        if solution is None:
+            return None
+        new_rows, new_bounds = broken(solution)
+        if not len(new_rows):
+            return solution
+        rows, bounds = np.vstack([rows, new_rows]), np.concatenate([bounds, new_bounds])
+        solution = constrained_least_squares(columns, wanted, (rows, bounds))
+    return None

@@ -95,7 +95,7 @@ class Projection(ABC):
             return squared_distance(candidate, common, stress.T, draws.modulus)
 
         best = min(self.candidates(draws.states), key=loss)
-        rows = StabilityRows.of(self.material, best.setting, draws.stability_states, draws.largest_invariants)
+        rows = StabilityRows.of(self.material, best.setting, draws.stability_states)
         values = np.array([nearest_values(best, rows, draws, number) for number in range(len(draws.ensemble))])
         return Law(self.material, np.hstack([values, np.tile(best.setting, (len(values), 1))]))
 

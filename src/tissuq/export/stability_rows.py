@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.experiments.modes import States, curve_modes
-from tissuq.export.constrained_fit import Inequalities
 from tissuq.export.states import SeenStates
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.mechanics.rays import through
 
-__all__ = ["StabilityRows", "StabilityStates", "least_eigenvalues", "wanted_stiffness"]
+__all__ = ["Inequalities", "StabilityRows", "StabilityStates", "least_eigenvalues", "wanted_stiffness"]
 
 FloatArray = NDArray[np.float64]
+Inequalities = tuple[FloatArray, FloatArray]
+"""Rows (m, k) and bounds (m,): rows x >= bounds."""
 
 LODE_ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0)
 MODE_ANGLES = (0.0, 30.0, 60.0)
@@ -33,15 +34,18 @@ MIN_SLOPE = 0.003
 
 
 class StabilityStates:
-    """States in which stability is asked for, up to some I1 - 3 and I2 - 3, and the Hessian of an energy there.
+    """States in which stability is asked for, and the Hessian of an energy there.
 
     Attributes
     ----------
+    max_invariants : (float, float)
+        The largest I1 - 3 and I2 - 3.
     is_along_mode : (n,) array of bool
         States of uniaxial, equibiaxial and planar tests.
     """
 
     def __init__(self, max_invariants: tuple[float, float]) -> None:
+        self.max_invariants = max_invariants
         self.logs = SeenStates(max_invariants, LODE_ANGLES).logs
         self.is_along_mode = np.isin(np.repeat(LODE_ANGLES, len(self.logs) // len(LODE_ANGLES)), MODE_ANGLES)
 
@@ -97,14 +101,12 @@ class StabilityRows:
     slopes: FloatArray
 
     @classmethod
-    def of(
-        cls, material: Material, setting: ArrayLike, states: StabilityStates, max_invariants: tuple[float, float]
-    ) -> StabilityRows:
-        """Return the rows of a material with given other parameters, up to these I1 - 3 and I2 - 3."""
+    def of(cls, material: Material, setting: ArrayLike, states: StabilityStates) -> StabilityRows:
+        """Return the rows of a material with given other parameters in states, and in loading modes as far as these."""
         tangents = states.hessian(stress_basis(material, states.nudged, setting))
         slopes = []
         for mode in curve_modes():
-            ends = (farthest_stretch(mode, MeasuredStates(*max_invariants), side) for side in (-1, 1))
+            ends = (farthest_stretch(mode, MeasuredStates(*states.max_invariants), side) for side in (-1, 1))
             stretch = np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE + 1)[1:] for end in ends])
             high, low = (stress_basis(material, mode.at(stretch + sign * LOG_STEP), setting) for sign in (1, -1))
             slopes.append((high - low) / (2 * LOG_STEP))

@@ -1,12 +1,11 @@
 """Finite elements with the draws of a posterior: materials for FElupe, cases, and the uncertainty of what they give."""
 
+from tissuq.finite_elements.bodies import ClampedBar, Indentation, PlateWithHole, SphericalIndentation
 from tissuq.finite_elements.body_from_file import BodyFromFile, InflatedBody
-from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, RigidTip, Supports, cases
+from tissuq.finite_elements.case import Case, Mesh, RigidTip, Supports, cases
 from tissuq.finite_elements.material import FElupeMaterial
-from tissuq.finite_elements.plate import PlateWithHole
 from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond
 from tissuq.finite_elements.simulation import Simulation, simulate
-from tissuq.finite_elements.sphere import SphericalIndentation
 from tissuq.finite_elements.spread import Band, Shares, band_of, shares_of
 from tissuq.posterior.draws_in_words import FailedDraw
 

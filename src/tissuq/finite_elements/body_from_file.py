@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, Case, FloatArray, Inflation, Mesh, RigidTip, Supports
-from tissuq.finite_elements.library import region_of
 from tissuq.finite_elements.mesh_file import AXES, NEARLY, MeshFile, deck_text, read_mesh
 
 __all__ = ["BodyFromFile", "InflatedBody"]
@@ -189,7 +188,7 @@ class BodyFromFile(Case):
         mesh = self._mesh_and_sets()[0]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of negative volumes, which are refused here
-            region = region_of(mesh)
+            region = mesh.region()
         folded = np.flatnonzero(~(region.dV > 0).all(axis=0))
         if len(folded):
             corner = ", ".join(f"{value:.4g}" for value in mesh.vectors(mesh.points[mesh.cells[folded[0], :1]])[0])
@@ -333,7 +332,7 @@ class InflatedBody(BodyFromFile):
 
     def _check_faces(self, mesh: Mesh) -> None:
         """Refuse a set that has every face of the surface: a pressure all around only squeezes."""
-        region = region_of(mesh, "Boundary", ensure_3d=not mesh.is_solid)
+        region = mesh.region("Boundary", ensure_3d=not mesh.is_solid)
         if len(np.setdiff1d(region.mesh.cells_faces, self._found().sets[self.press])):
             return
         raise InputError(

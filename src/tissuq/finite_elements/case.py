@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from math import ceil, inf, log
-from typing import ClassVar, Literal, NamedTuple, get_args
+from math import inf
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,21 +19,35 @@ __all__ = [
     "CELL_KINDS",
     "Case",
     "CellKind",
-    "ClampedBar",
-    "Indentation",
     "Inflation",
     "Mesh",
     "RigidTip",
     "Supports",
     "cases",
-    "graded",
-    "grid",
+    "felupe",
 ]
 
 FloatArray = NDArray[np.float64]
 
 AXIAL, ACROSS = 0, 1
 """Columns of points and displacements."""
+
+
+def felupe() -> Any:
+    """Return FElupe, imported when it is first needed.
+
+    Raises
+    ------
+    InputError
+        When it is not installed.
+    """
+    try:
+        import felupe as library
+    except ImportError as error:
+        raise InputError(
+            "finite elements need FElupe: install tissuq with its extra 'fe' (pip install 'tissuq[fe]')."
+        ) from error
+    return library
 
 
 class CellKind(NamedTuple):
@@ -91,6 +105,19 @@ class Mesh(NamedTuple):
     def kind(self) -> CellKind:
         """The kind of its cells."""
         return CELL_KINDS[self.points.shape[1], self.cells.shape[1]]
+
+    def region(self, kind: str = "", **options: Any) -> Any:
+        """Return FElupe's region of its cells, or one of a further kind, such as ``Boundary``, with its options."""
+        library = felupe()
+        cells = library.Mesh(self.points, self.cells, self.kind.meshio)
+        return getattr(library, f"{self.kind.region}{kind}")(cells, **options)
+
+    def field_on(self, region: Any) -> Any:
+        """Return displacements on a region: of a solid, in plane strain, or around an axis."""
+        library = felupe()
+        if self.is_solid:
+            return library.Field(region, dim=3)
+        return (library.FieldPlaneStrain if self.is_plane else library.FieldAxisymmetric)(region, dim=2)
 
     def vectors(self, values: FloatArray) -> FloatArray:
         """Return points or displacements (n, 2 or 3) with the axes of files (n, 3), right-handed."""
@@ -237,131 +264,3 @@ class Case(ABC):
 def cases() -> dict[str, type[Case]]:
     """Return every case by name."""
     return variants(Case)
-
-
-def graded(length: float, smallest_cell: float, growth: float) -> FloatArray:
-    """Return places from 0 to a length whose distances grow from about the smallest one, each by the same factor.
-
-    Examples
-    --------
-    >>> graded(7.0, 1.0, 2.0).tolist()
-    [0.0, 1.0, 3.0, 7.0]
-    """
-    count = max(1, ceil(log(1 + length / smallest_cell * (growth - 1)) / log(growth) - 1e-9))
-    fractions = (growth ** np.arange(count + 1) - 1) / (growth**count - 1)
-    return np.asarray(length * fractions)
-
-
-def grid(axial: FloatArray, radial: FloatArray) -> Mesh:
-    """Return the mesh of all pairs of places along the axis and distances from it."""
-    points = np.stack(np.meshgrid(axial, radial, indexing="ij"), axis=-1).reshape(-1, 2)
-    number = np.arange(len(points)).reshape(len(axial), len(radial))
-    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    return Mesh(points, np.stack([corner.ravel() for corner in corners], axis=-1))
-
-
-BAR_CELL, BAR_GROWTH = 0.04, 1.4
-"""Size of the cells at the clamp's rim with fineness 1, in radii, and ratio of the sizes of neighbouring cells."""
-
-
-@dataclass(frozen=True)
-class ClampedBar(Case):
-    """Tension of a round bar, both ends glued to rigid plates, so that it necks in; half of it, by symmetry.
-
-    Attributes
-    ----------
-    elongation, bar_length, bar_radius : float
-        Sizes of the whole bar, mm.
-    fineness : float
-        Twice as fine halves all cells.
-    """
-
-    name: ClassVar[str] = "bar"
-    description: ClassVar[str] = "a round bar glued to two plates, in tension"
-    travel_name: ClassVar[str] = "elongation"
-
-    elongation: float = 1.0
-    bar_length: float = 10.0
-    bar_radius: float = 2.5
-    fineness: float = 1.0
-
-    def mesh(self) -> Mesh:
-        smallest_cell, growth = self.bar_radius * BAR_CELL / self.fineness, BAR_GROWTH ** (1 / self.fineness)
-        half = self.bar_length / 2
-        axial, radial = (
-            half - graded(half, smallest_cell, growth)[::-1],
-            self.bar_radius - graded(self.bar_radius, smallest_cell, growth)[::-1],
-        )
-        return grid(axial, radial)
-
-    def supports(self, points: FloatArray) -> Supports:
-        axial, radial = points[:, AXIAL], points[:, ACROSS]
-        tolerance = 1e-9 * self.bar_length
-        middle, clamp = axial < tolerance, axial > self.bar_length / 2 - tolerance
-        return Supports(np.stack([middle, clamp | (radial < tolerance)], axis=-1), clamp, 0.5)
-
-
-Contact = Literal["bonded", "frictionless"]
-
-PUNCH_CELL, PUNCH_GROWTH = 0.05, 1.3
-"""Size of the cells at the punch's edge with fineness 1, in punch radii, and ratio of neighbouring cells' sizes."""
-
-
-@dataclass(frozen=True)
-class Indentation(Case):
-    """Indentation by a flat rigid punch along the axis of a disc that is glued to a rigid base.
-
-    The tissue under the punch sticks to it, or slides on it without friction; which points touch it does not change, so
-    that without friction the punch must not go deep. The rest of the surface is free. Strains are singular at the edge,
-    as under any sharp punch: a finer mesh goes less deep.
-
-    Attributes
-    ----------
-    depth, punch_radius, height, radius : float
-        Sizes in mm. Defaults are those of tests of brain slices: a punch 1.5 mm wide, a slice 5 mm thick.
-    contact : str
-        ``"bonded"`` or ``"frictionless"``.
-    fineness : float
-        Twice as fine halves all cells.
-    """
-
-    name: ClassVar[str] = "indentation"
-    description: ClassVar[str] = "a flat rigid punch in a disc of tissue on a rigid base"
-    travel_name: ClassVar[str] = "depth"
-
-    depth: float = 0.4
-    punch_radius: float = 0.75
-    height: float = 5.0
-    radius: float = 7.5
-    contact: Contact = "bonded"
-    fineness: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.contact not in get_args(Contact):
-            contacts = " or ".join(get_args(Contact))
-            raise InputError(f"case '{self.name}': contact must be {contacts}, not {self.contact!r}.")
-        if self.depth >= self.height or self.punch_radius >= self.radius:
-            raise InputError(
-                f"case '{self.name}': the depth ({self.depth:g} mm) must be less than the height ({self.height:g} mm), "
-                f"and the punch radius ({self.punch_radius:g} mm) less than the radius ({self.radius:g} mm)."
-            )
-
-    def mesh(self) -> Mesh:
-        a, smallest_cell, growth = (
-            self.punch_radius,
-            self.punch_radius * PUNCH_CELL / self.fineness,
-            PUNCH_GROWTH ** (1 / self.fineness),
-        )
-        inside, outside = graded(a, smallest_cell, growth), graded(self.radius - a, smallest_cell, growth)
-        radial = np.concatenate([a - inside[::-1], a + outside[1:]])
-        return grid(self.height - graded(self.height, smallest_cell, growth)[::-1], radial)
-
-    def supports(self, points: FloatArray) -> Supports:
-        axial, radial = points[:, AXIAL], points[:, ACROSS]
-        tolerance = 1e-9 * self.radius
-        base = axial < tolerance
-        punch = (axial > self.height - tolerance) & (radial < self.punch_radius + tolerance)
-        sticks = punch & (self.contact == "bonded")
-        fixed = np.stack([base, base | (radial < tolerance) | sticks], axis=-1)
-        return Supports(fixed, punch, -1.0)

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import AXIAL, Inflation, Mesh, RigidTip, Supports
-from tissuq.finite_elements.library import felupe, field_on, region_of
+from tissuq.finite_elements.case import AXIAL, Inflation, Mesh, RigidTip, Supports, felupe
 
 __all__ = ["Action", "Contact", "Load", "Pressure", "load_on"]
 
@@ -120,14 +119,14 @@ class Pressure(Load):
 
     def __init__(self, inflation: Inflation, mesh: Mesh, modulus: float) -> None:
         try:
-            region = region_of(mesh, "Boundary", mask=inflation.points, ensure_3d=not mesh.is_solid)
+            region = mesh.region("Boundary", mask=inflation.points, ensure_3d=not mesh.is_solid)
             empty = not len(region.mesh.cells)
         except (ValueError, IndexError):  # FElupe's region of no face
             empty = True
         if empty:
             raise InputError("no face of the surface has all of its points in the set that is under pressure.")
         self._inflation, self._unit = inflation, MPA_OF_KPA / modulus
-        self._field = felupe().FieldContainer([field_on(region, mesh)])
+        self._field = felupe().FieldContainer([mesh.field_on(region)])
         self._body = felupe().SolidBodyPressure(self._field)
 
     def at(self, u: FloatArray, travel: float) -> Action:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ConvergenceError, InputError, ModelError
-from tissuq.finite_elements.case import Case, ClampedBar, Indentation
+from tissuq.finite_elements.bodies import ClampedBar, Indentation
+from tissuq.finite_elements.case import Case
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.solver import CellFields, Solver
 from tissuq.inference.threads import one_thread
@@ -21,7 +22,6 @@ from tissuq.posterior.ensemble import EnergyDraw
 
 __all__ = [
     "BULK_RATIO",
-    "CellFields",
     "Response",
     "Run",
     "Solve",

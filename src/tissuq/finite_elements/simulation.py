@@ -73,12 +73,10 @@ class Simulation:
     ensembles : mapping of str to Ensemble
     noise_sd : float
         Standard deviation of a new measurement of the force, N.
-    mesh_change : (float, float) or None
-        Relative change of the force of one draw on a finer mesh, and the travel (mm) at which.
     seconds : float
         Computing time of all draws on one processor, s.
     mesh_changes : tuple of (float, float)
-        The same at every travel at which there is one: the travel (mm), and the relative change of the force.
+        Of one draw on a finer mesh: travels (mm), and the relative changes of the force.
     first_order_error : mapping of str to FirstOrderError
         By family of which not all draws were computed in full: relative errors of the force of one that was not, and of
         the mean and the sd of all.
@@ -100,7 +98,6 @@ class Simulation:
     fields: Mapping[str, FloatArray]
     ensembles: Mapping[str, Ensemble]
     noise_sd: float
-    mesh_change: tuple[float, float] | None
     seconds: float
     mesh_changes: tuple[tuple[float, float], ...] = ()
     first_order_error: Mapping[str, FirstOrderError] = field(default_factory=dict)
@@ -114,6 +111,11 @@ class Simulation:
         if COMPLETE not in self.first_order_error:
             return np.ones(len(self.forces[COMPLETE]), dtype=bool)
         return np.asarray(np.isfinite(self.volume_beyond).any(axis=1))
+
+    @property
+    def mesh_change(self) -> tuple[float, float] | None:
+        """The relative change of the force of one draw on a finer mesh, and the last travel (mm) at which."""
+        return self.mesh_changes[-1][::-1] if self.mesh_changes else None
 
     @property
     def mesh_factor(self) -> FloatArray:
@@ -267,7 +269,6 @@ def simulate(
         fields=_fields(complete, results),
         ensembles=ensembles,
         noise_sd=_noise_sd(posterior, forces[COMPLETE]) if force_noise is None else force_noise,
-        mesh_change=mesh_changes[-1][::-1] if mesh_changes else None,
         seconds=sum(result["seconds"] for result in results.values()),
         mesh_changes=mesh_changes,
         first_order_error=errors,

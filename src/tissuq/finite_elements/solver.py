@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.export.cards import NEARLY
-from tissuq.finite_elements.case import AXIAL, Case
-from tissuq.finite_elements.library import felupe, field_on, region_of
+from tissuq.finite_elements.case import AXIAL, Case, felupe
 from tissuq.finite_elements.loads import Action, load_on
 from tissuq.finite_elements.material import FElupeMaterial, distortional_energy
 from tissuq.mechanics import Material
@@ -113,8 +112,8 @@ class Solver:
         energy = distortional_energy(material, values)  # which refuses fibres: a case has no directions for them
         self._umat = FElupeMaterial(material, values=values)
         self._modulus = self._umat.unit = _stiffness(material, energy.initial_shear_modulus)
-        region = region_of(mesh)
-        field = field_on(region, mesh)
+        region = mesh.region()
+        field = mesh.field_on(region)
         width = 1.0 if mesh.is_solid or mesh.is_plane else 2 * np.pi * field.radius
         self._field = fem.FieldContainer([field])
         self._solid = fem.SolidBodyNearlyIncompressible(self._umat, self._field, bulk=bulk_ratio)

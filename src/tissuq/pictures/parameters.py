@@ -20,7 +20,14 @@ from tissuq.parameters.priors import Prior
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["MODULUS", "marginal_of", "marginals", "parameters_to_show", "ridges"]
+__all__ = [
+    "MODULUS",
+    "intervals",
+    "marginal_of",
+    "marginals",
+    "parameters_to_show",
+    "ridges",
+]
 
 MODULUS = "initial shear modulus"
 """In place of a parameter's symbol."""
@@ -116,6 +123,19 @@ def ridges(
         )  # fmt: skip
     axis.spines["left"].set_visible(False)
     axis.set_ylim(-0.35, len(solutions) + 0.1)
+
+
+def intervals(axis: Axes, marginals: Mapping[str, Marginal], average: Marginal, label: str, factor: float) -> None:
+    """Draw means and 95 % intervals by name, and those of an average in black beneath; ``factor`` is that of a unit.
+
+    Far ones may leave the axis, which shows every mean.
+    """
+    named = {**marginals, "all, by probability": average}
+    levels = rows(axis, list(named))
+    ends = np.array([(low, m.mean, high) for m in named.values() for low, high in [m.hdi()]]) / factor
+    for number, color in ((slice(-1), BAND), (slice(-1, None), INK)):
+        forest(axis, levels[number], *ends[number].T, color=color)
+    axis.set_xlabel(label)
 
 
 def _scale(solution: Solution, name: str, unit: StressUnit) -> tuple[float, str]:

@@ -1,4 +1,4 @@
-"""Pictures of predictions: bands over any stretches, and where they go beyond what was measured."""
+"""Pictures of predictions: bands over any stretches and beyond what was measured, and the stress of every draw."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.stability import calibrated_range, is_calibrated, measured_range
 from tissuq.drawing.panels import Panels, limits_of, within
 from tissuq.drawing.pieces import band, cut_off, line, outside, points
-from tissuq.drawing.style import BASE, INK, relative_size
+from tissuq.drawing.style import BAND, BASE, INK, relative_size
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
@@ -24,14 +24,7 @@ from tissuq.prediction.bands import Band, predict_bands, speaks_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "Measured",
-    "Predicted",
-    "draw_predicted",
-    "predicted_limits",
-    "prediction",
-    "predictions",
-]
+__all__ = ["Measured", "Predicted", "curves", "draw_predicted", "predicted_limits", "prediction", "predictions"]
 
 FloatArray = NDArray[np.float64]
 
@@ -43,6 +36,8 @@ LESSER_REACHES = (REACH, REACH / 3, REACH / 10)
 """The same where a material locks before."""
 KNOWN_MARGIN, NEAR_MARGIN = 0.75, 0.25
 """Of calibrated bands, over the range of measurements and medians, and of others, over that: how much an axis shows."""
+MOST_DRAWN = 200
+"""Draws with a line of their own; of more some are drawn, evenly through the ensemble."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,6 +223,26 @@ def draw_predicted(
         if is_shown.any():
             points(axis, shown.abscissa[is_shown], shown.stress[is_shown] / scale, label=label,
                    mec=INK, mfc=face, ms=3.6 * size, mew=0.9 * size)  # fmt: skip
+
+
+def curves(drawn: Panels, stretch: FloatArray, stress: FloatArray, mode: LoadingMode, unit: StressUnit) -> None:
+    """Draw the stresses (N, g), MPa, of draws at stretches (g,), and their median."""
+    (axis,), count = drawn.axes, len(stress)
+    order = np.argsort(stretch, kind="stable")
+    abscissa, values = stretch[order], stress[:, order] / unit.to_mpa
+    median = np.median(values, axis=0)
+    limits = limits_of([median], [np.quantile(values, [0.005, 0.995], axis=0)])
+    indices = np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)
+    label = f"{count} draws" if len(indices) == count else f"{len(indices)} of {count} draws"
+    for number, row in enumerate(values[indices]):
+        line(axis, abscissa, within(row, limits), color=BASE, width=0.6, alpha=0.5, label="" if number else label)
+    line(axis, abscissa, median, color=BAND, label="median of the draws")
+    axis.set_ylim(limits)
+    axis.set_xlabel(mode.controls[0].name)
+    axis.set_ylabel(f"{mode.stresses[0]} [{unit.name}]")
+    if drawn.is_new:
+        axis.set_title(mode.name)
+    drawn.explain()
 
 
 def _measured(solution: Solution, mode: LoadingMode, channel: int) -> Measured | None:

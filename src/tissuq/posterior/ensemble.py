@@ -26,7 +26,7 @@ from tissuq.mechanics.invariants import invariant_rates, invariants, largest_inv
 from tissuq.mechanics.pieces import PiecewiseEnergy
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.pictures.draws import curves
+from tissuq.pictures.prediction import curves
 
 __all__ = ["EnergyDraw", "Ensemble", "stress_of", "stress_within"]
 

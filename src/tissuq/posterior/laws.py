@@ -28,7 +28,7 @@ from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
-from tissuq.pictures.rows import intervals
+from tissuq.pictures.parameters import intervals
 from tissuq.posterior.fitting import OPTIONS, fit
 from tissuq.posterior.least_squares import LeastSquares, least_squares
 from tissuq.posterior.plots import ROW

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.export.cards import origin_sentences
-from tissuq.finite_elements.response import CellFields, respond
+from tissuq.finite_elements.response import respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
+from tissuq.finite_elements.solver import CellFields
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.band_table import SHARES, Bands, handy_unit, percent_of
 from tissuq.report.result import Number, Picture, Result, Section, Table

@@ -12,9 +12,14 @@ from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, TRUTH, new_figure
 from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.spread import PROBABILITY
 from tissuq.report.result import MAX_NUMBERS, Number, Picture, Result, Section, Table
-from tissuq.validation.structures import StructureStudySettings, summarise_structures
-from tissuq.validation.structures.campaign import DEFAULT, ORACLE
-from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES
+from tissuq.validation.structures import (
+    DEFAULT,
+    KNOWN_LAWS,
+    ORACLE,
+    STRUCTURES,
+    StructureStudySettings,
+    summarise_structures,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -123,11 +123,9 @@ class CalibrationSettings(ModelSettings):
     kernel: str = option(
         "squared-exponential",
         "squared-exponential or matern-5/2.",
-        choices="tissuq.emulation.length_scales:Kernel",
+        choices="tissuq.emulation.kriging:Kernel",
     )
-    trend: str = option(
-        "linear", "Mean: constant, linear or quadratic.", choices="tissuq.emulation.length_scales:Trend"
-    )
+    trend: str = option("linear", "Mean: constant, linear or quadratic.", choices="tissuq.emulation.kriging:Trend")
     method: str = option("auto", "auto, importance or nuts.", choices="tissuq.emulation.problem:Method")
     material: str | None = option(
         None, "Law in the model with all its parameters: predict, export and structure then take the run."

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.finite_elements.library import felupe
+from tissuq.finite_elements.case import felupe
 from tissuq.finite_elements.response import Solve, solved
 from tissuq.finite_elements.simulation import Simulation, simulate
 from tissuq.finite_elements.warnings import simulation_warnings

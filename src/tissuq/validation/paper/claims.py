@@ -62,11 +62,11 @@ def find(posterior: Posterior, truth: float, base: Band | None = None) -> Findin
     )
 
 
-def passes(share: float, measurements: int, prob: float = 0.95) -> bool:
+def passes(share: float, measurements: int) -> bool:
     """Return whether a share inside a 95 % band is what chance allows: not in the lowest 2.5 % of a binomial law."""
     from scipy.special import bdtr
 
-    return bool(bdtr(round(share * measurements), measurements, prob) > 0.025)
+    return bool(bdtr(round(share * measurements), measurements, 0.95) > 0.025)
 
 
 INFLATED = ("constant", "linear", "mooney-rivlin")

@@ -1,36 +1,132 @@
-"""A campaign as small tasks: simulated tests of a known law, their fit and an oracle's, and bands of the forces."""
+"""Whether bands of the force of a structure hold: simple tests of a known law, and the structure with their fit."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import field_validator
 
-from tissuq.errors import TissuqError
+from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
+from tissuq.finite_elements import Case, ClampedBar, Indentation, PlateWithHole
 from tissuq.finite_elements.response import respond
 from tissuq.finite_elements.simulation import COMPLETE, simulate
 from tissuq.finite_elements.spread import band_of
 from tissuq.mechanics import engineering_stress, material_named
+from tissuq.model.tolerances import Tolerances
+from tissuq.parameters.priors import Prior, Uniform
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
+from tissuq.studies.campaign_settings import StructureStudyOptions
+from tissuq.studies.settings import there_is
 from tissuq.studies.stream import Campaign
-from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES, KnownLaw, StructureStudySettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "DEFAULT", "ORACLE", "StructureTask", "carry_out", "run_structures", "simulated_tests", "summarise_structures",
+    "DEFAULT",
+    "KNOWN_LAWS",
+    "ORACLE",
+    "STRUCTURES",
+    "KnownLaw",
+    "StructureStudySettings",
+    "StructureTask",
+    "carry_out",
+    "run_structures",
+    "simulated_tests",
+    "summarise_structures",
     "tasks_of",
-]  # fmt: skip
+]
 
 FloatArray = NDArray[np.float64]
+
+
+class KnownLaw(NamedTuple):
+    """A law with its parameters, MPa where they are stresses, and what priors an oracle has that differ."""
+
+    material: str
+    values: tuple[float, ...]
+    priors: Mapping[str, Prior] = MappingProxyType({})
+
+
+KNOWN_LAWS = {
+    "gent": KnownLaw("gent", (0.01, 0.8)),
+    "ogden": KnownLaw("ogden-1", (0.01, -9.0), MappingProxyType({"alpha1": Uniform(-40.0, -0.5)})),
+}
+"""The truths: one that locks at I1 - 3 = 0.8, and one that is much stiffer in compression than in tension."""
+STRUCTURES: dict[str, Case] = {
+    "bar": ClampedBar(elongation=1.5, fineness=0.5),
+    "indentation": Indentation(depth=0.3, fineness=0.5),
+    "plate": PlateWithHole(elongation=2.0, fineness=0.5),
+}
+"""Structures by name, with meshes that are the same for the truth: errors of a mesh have no part in coverage."""
+
+
+def _with_one_control(name: str) -> None:
+    if len(loading_mode(name).controls) > 1:
+        raise ModelError(f"the mode {name!r} has several controls; choose among those with one")
+
+
+class StructureStudySettings(StructureStudyOptions):
+    """Everything that a campaign on the force of structures depends on.
+
+    Attributes
+    ----------
+    truths, structures : tuple of str
+        Of `KNOWN_LAWS` and `STRUCTURES`.
+    replicates : int
+        Sets of tests of every truth.
+    modes : tuple of str
+        A test in each.
+    low, high : float
+        Stretches between which they are made.
+    points : int
+        Of every test.
+    noise : float
+        Standard deviation over the largest stress of a test.
+    estimand : str
+        Whose errors of tests are simulated, and told to the fits.
+    draws, full_runs, steps : int
+        As of `tissuq structure`.
+    seed : int
+    """
+
+    @field_validator("truths")
+    @classmethod
+    def _known_truths(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return _all_of(names, KNOWN_LAWS, "law")
+
+    @field_validator("structures")
+    @classmethod
+    def _known_structures(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return _all_of(names, STRUCTURES, "structure")
+
+    _known_modes = field_validator("modes")(there_is(_with_one_control))
+    _known_estimand = field_validator("estimand")(there_is(Tolerances))
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """Sizes of the errors of tests."""
+        return Tolerances(self.estimand)
+
+
+def _all_of(names: tuple[str, ...], available: Mapping[str, object], what: str) -> tuple[str, ...]:
+    """Return names, each of which is known and given once."""
+    for name in names:
+        if name not in available:
+            raise ValueError(f"there is no {what} {name!r}; choose from {', '.join(available)}")
+    if len(set(names)) < len(names):
+        raise ValueError(f"give every {what} once")
+    return names
+
 
 DEFAULT, ORACLE = "default", "oracle"
 """The fit as it is unless anything is said, and one that knows the law."""
