@@ -79,6 +79,24 @@ def test_a_run_leaves_the_promised_files(calibrate_run):
     )
 
 
+def test_a_page_says_for_what_the_parameters_can_be_used_and_what_those_of_the_errors_are(calibrate_run):
+    folder, _ = calibrate_run
+    record = json.loads((folder / "run" / "result.json").read_text())
+    uses = {use["purpose"]: use["verdict"] for use in record["uses"]}
+    assert uses == {
+        "report mu and b": "with care",  # of the variance the emulator makes more than a tenth
+        "predict this experiment": "yes",
+        "use mu and b in another model": "yes",
+    }
+    (table,) = record["tables"]
+    assert {row[0]: row[1] for row in table["rows"]} == {
+        "mu": "of the forward model",
+        "b": "of the forward model",
+        "c [mN]": "sd of the discrepancy",
+        "psi [mm]": "length of the discrepancy",
+    }
+
+
 def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
     folder, _ = calibrate_run
     rows = {row["parameter"]: row for row in json.loads((folder / "run" / "summary.json").read_text())}

@@ -21,6 +21,7 @@ from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
 __all__ = [
+    "MIN_INSIDE",
     "MIN_OFTEN_STABLE",
     "MIN_STABLE",
     "PRECISE",

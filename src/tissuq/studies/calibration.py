@@ -27,6 +27,7 @@ from tissuq.experiments.units import PRESSURE, measured_in, stress_unit
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
+from tissuq.result_warning import ResultWarning
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
 from tissuq.studies.earlier_run import load_law, priors_of_run
@@ -77,15 +78,19 @@ class CalibrationStudy:
         material = self.settings.material
         parameters = () if material is None else material_named(material).parameters
         of_material = {parameter.symbol: self.settings.unit for parameter in parameters if parameter.unit}
-        of_noise = {symbol_of(NOISE_SD.symbol, name): measured.units[1] for name, measured in self.data.items()}
-        return of_material | {symbol: unit for symbol, unit in of_noise.items() if unit}
+        of_errors = {
+            symbol_of(parameter.symbol, name): measured.units[0 if parameter.dimension == "stretch" else 1]
+            for name, measured in self.data.items()
+            for parameter in (*self.calibration.problem.discrepancy.parameters, NOISE_SD)
+        }
+        return of_material | {symbol: unit for symbol, unit in of_errors.items() if unit}
 
     def label(self, symbol: str) -> str:
         """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""
         return f"{symbol} [{self.units[symbol]}]" if symbol in self.units else symbol
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[ResultWarning]:
         """Warnings about the calibration."""
         return list(self.calibration.warnings)
 
