@@ -32,6 +32,7 @@ from tissuq.report.summary import SAME_STATES
 from tissuq.report.tables import table_files
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
+from tissuq.studies.settings import seen_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -88,7 +89,7 @@ def prediction_result(
         The material that was named, where it is a law in the user's file.
     """
     copies = Copies()
-    relocated: dict[str, Any] = {"run": os.path.relpath(beside / settings.run, target), "mode": prediction.mode.name}
+    relocated: dict[str, Any] = {"run": seen_from(target, beside / settings.run), "mode": prediction.mode.name}
     files: dict[str, Any] = {"prediction.csv": prediction.rows, "prediction.nc": prediction.save}
     if settings.data is not None:
         copy = {"file": copies.of_file(beside / settings.data.file), "mode": prediction.mode.name}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DAMAGE", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
-    "looked_up", "positive_or_unknown", "setting_of", "there_is",
+    "looked_up", "positive_or_unknown", "seen_from", "setting_of", "there_is",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
@@ -118,6 +119,15 @@ def is_inside(file: Path, folder: Path) -> bool:
         return file.resolve().is_relative_to(folder)
     except (OSError, ValueError, RuntimeError):  # such as a NUL or a circle of links
         return False
+
+
+def seen_from(folder: Path, path: str | Path) -> str:
+    """Return a path as a file in a folder names it: relative, and right where a folder on the way is a symbolic link.
+
+    ``..`` leads from the folder that a link names, not from the one in which the link lies.
+    """
+    named = Path(path)
+    return os.path.relpath(named.parent.resolve() / named.name, folder.resolve())
 
 
 def _explanations(error: ValidationError, kind: type[BaseModel], typed: Mapping[str, str]) -> list[str]:
