@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from tissuq.studies.calibration import _are_proportional
+from tissuq.studies.calibration import _are_proportional, _stresses_of_specimens
 
 from .conftest import command, run_in, tree
 
@@ -319,6 +319,48 @@ def test_the_posterior_of_the_measurements_is_no_prior_of_them(fitted, file, sou
     assert said.status == 2
     assert "which would count twice" in " ".join(said.err.split())
     assert not list(fitted.glob("out*"))
+
+
+def test_the_stresses_of_every_specimen_are_looked_at_in_a_population(tmp_path):
+    """The short version, of its measurements alone: successive ones, also of every second row."""
+    rows = [("S1", 1.0, 1.5), ("S1", 1.1, 2.5), ("S2", 1.0, 3.5), ("S2", 1.1, 4.5), ("S2", 1.2, 6.5)]
+    text = "specimen,stretch,stress [kPa]\n" + "".join(f"{name},{at},{stress}\n" for name, at, stress in rows)
+    (tmp_path / "data.csv").write_text(text)
+    (tmp_path / "posterior").mkdir()
+    posterior = tmp_path / "posterior" / "new-patient.nc"
+    posterior.touch()
+    for run in (tmp_path, posterior):
+        found = [values.tolist() for values in _stresses_of_specimens(run, 2, 1)]
+        assert found == [[1.5, 2.5], [3.5, 4.5], [4.5, 6.5]]
+    assert [values.tolist() for values in _stresses_of_specimens(tmp_path, 2, 2)] == [[3.5, 6.5]]
+    (tmp_path / "data.csv").write_text("stretch,stress [kPa]\n1.0,1.5\n1.1,2.5\n")  # of a fit, whose posterior has it
+    assert list(_stresses_of_specimens(tmp_path, 2, 1)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rows", "is_one"), [("all", True), ("some, as forces", True), ("another", False)])
+def test_a_specimen_of_a_population_is_not_calibrated_beside_its_posterior(tmp_path, rows, is_one):
+    """The file of the population holds all specimens; what is calibrated, one of them, or some of its rows."""
+    stretch, rng = np.round(np.linspace(1.0, 1.3, 14), 3), np.random.default_rng(6)
+    stresses = {
+        name: np.round(modulus * (stretch - stretch**-2) + 0.02 * rng.standard_normal(14), 4)
+        for name, modulus in (("S1", 5.0), ("S2", 6.0), ("S3", 7.0), ("S4", 6.5))
+    }
+    files = {"all": stresses["S2"], "some, as forces": 0.02 * stresses["S2"], "another": stresses.pop("S4")}
+    lines = [f"{name},{a},{b}" for name, values in stresses.items() for a, b in zip(stretch, values, strict=True)]
+    (tmp_path / "all.csv").write_text("\n".join(["specimen,stretch,stress (kPa)", *lines]) + "\n")
+    said = run_in(tmp_path, "population", "all.csv", "--mode", "uniaxial", "--discrepancy", "none", "--noise-sd", 0.02,
+                  "--no-figures", "--out", "tissue")  # fmt: skip
+    assert said.status == 0, said.err
+    taken = slice(3, 12) if rows == "some, as forces" else slice(None)
+    lines = [f"{a},{b:.5g}" for a, b in zip(stretch[taken], files[rows][taken], strict=True)]
+    (tmp_path / "one.csv").write_text("\n".join(["stretch,measured (kPa)", *lines]) + "\n")
+    (tmp_path / "tension.py").write_text(TENSION)
+    options = ["--forward", "tension.py:stress", "--material", "neo-hookean", "--range", "1:1.3", "--unit", "kPa"]
+    options += ["--prior-run", "tissue", "--noise-sd", 0.02, "--runs", 8, "--no-figures", "--out", "out"]
+    said = run_in(tmp_path, "calibrate", "one.csv", *options)
+    assert said.status == (2 if is_one else 0), said.err
+    assert ("which would count twice" in " ".join(said.err.split())) is is_one
 
 
 def test_the_posterior_of_other_measurements_is_a_prior(fitted):

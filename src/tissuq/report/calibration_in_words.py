@@ -132,7 +132,7 @@ def _of_model_alone(use: Use, study: CalibrationStudy) -> Use:
     """Return a use of the parameters elsewhere, where the model is by itself: its discrepancy does not go with them."""
     calibration = study.calibration
     if isinstance(calibration.problem.discrepancy, NoDiscrepancy):
-        reason = f"{use.reason}, {IF_RIGHT}" if use.reason else IF_RIGHT
+        reason = f"{use.reason}; {IF_RIGHT}" if use.reason else IF_RIGHT
         return use._replace(verdict=worst_of(use.verdict, Verdict.CARE), reason=reason)
     inside = calibration.predictive_coverage(discrepancy=False)
     counts = f"{100 * inside:.0f} % of the measurements inside the band of the model alone"

@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 __all__ = [
-    "DAMAGE", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
+    "DAMAGE", "DATA", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
     "looked_up", "positive_or_unknown", "seen_from", "setting_of", "there_is",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
+DATA = "data.csv"
+"""The file of a run with its measurements, converted."""
 INPUT = "input"
 """The folder of a run that holds copies of the user's files, so that the run can be repeated."""
 
