@@ -220,6 +220,11 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
     row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
     median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))
     assert median == pytest.approx(3 * (1.1 - 1.1**-2), rel=0.01)  # kPa
+    said = run_in(tmp_path, "predict", "run", "--mode", "planar", "--points", 3, "--out", "planar", "--no-figures")
+    assert said.status == 0, said.err
+    (use,) = json.loads((tmp_path / "planar" / "result.json").read_text())["uses"]
+    assert (use["purpose"], use["verdict"]) == ("predict other loading modes", "with care")  # without a discrepancy
+    assert use["reason"].endswith("if the model is right: its errors are not included")
     said = run_in(tmp_path, "export", "run", "--draws", 2, "--out", "cards")
     assert said.status == 0, said.err
 

@@ -42,6 +42,15 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     assert rows[-1][1:3] == ["", ""]
 
 
+def test_the_next_step_says_where_the_same_test_again_is_as_good(study, tmp_path):
+    repeats, words = study.table["is_repeat"], "(the same test again lowers it as much), and fit it together"
+    for loss, is_said in ((0.005, True), (0.03, False)):
+        best = study.table.loc[~repeats & (study.table["target"] == "modulus"), "reduction"].max()
+        table = study.table.assign(reduction=study.table["reduction"].mask(repeats, best - loss))
+        result = design_result(replace(study, table=table), study.settings, tmp_path / "run")
+        assert (words in result.next_step) is is_said
+
+
 def test_a_table_beneath_the_answer_has_the_ten_best_tests_and_a_folded_one_has_all(study, tmp_path):
     result = design_result(study, study.settings, tmp_path / "run")
     folded = [block for block in result.sections[0].blocks if isinstance(block, Table)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,7 +42,12 @@ CAPTION = (
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
 )
 AFTER_WARNING = "see first to the warning about the fit, whose measurements the ranking takes for right. Then"
-NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{options}"
+NEXT = (
+    "make the first of these tests{whose}{again}, and fit it together with the data: "
+    "tissuq fit DATA.csv NEW.csv{options}"
+)
+OR_AGAIN, AS_MUCH = " (the same test again lowers it as much)", 0.01
+"""What is said of a repeat of the data, and by how much of the sd now another test must be better."""
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")
 """Columns in the unit of a target."""
@@ -56,9 +62,12 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     measured_errors = {*model.experiment.least_errors, *(("stress", "test") if len(tests) > 1 else ())}
     stated = {name: size for name, size in tolerances.unusual.items() if name not in measured_errors}
     errors += "".join(f" --tolerance {name}={size:g}" for name, size in stated.items())
-    best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
+    ranked, again = next(of_kind for of_kind in map(partial(_ranked, study), study.targets) if len(of_kind[0]))
+    best = ranked.iloc[0]
+    is_as_much = len(again) and again.iloc[-1]["reduction"] > best["reduction"] - AS_MUCH
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
-    test = NEXT.format(whose=" on another specimen" * is_other, options=modes + errors)
+    whose = " on another specimen" * is_other
+    test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=modes + errors)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
 

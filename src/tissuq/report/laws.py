@@ -18,6 +18,7 @@ from tissuq.posterior.laws import ALL_LAWS
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.source_run import LAW_OF_USE
 from tissuq.report.tables import known_number, significant, table_files
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.laws import LawStudy
@@ -70,7 +71,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
-        uses=tuple(use._replace(purpose=f"{use.purpose}, with {law}") for use in answer.uses),
+        uses=tuple(use._replace(purpose=f"{use.purpose}{LAW_OF_USE}{law}") for use in answer.uses),
         next_step=_next_step(law, answer, is_of_all=settings.laws == (ALL_LAWS,)),
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(law_table(study),),
