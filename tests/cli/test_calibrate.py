@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from tissuq.studies.calibration import _are_proportional
+from tissuq.studies.calibration import _are_proportional, _stresses_of_specimens
 
 from .conftest import command, run_in, tree
 
@@ -77,6 +77,24 @@ def test_a_run_leaves_the_promised_files(calibrate_run):
         )
         if words != "depth (mm)"
     )
+
+
+def test_a_page_says_for_what_the_parameters_can_be_used_and_what_those_of_the_errors_are(calibrate_run):
+    folder, _ = calibrate_run
+    record = json.loads((folder / "run" / "result.json").read_text())
+    uses = {use["purpose"]: use["verdict"] for use in record["uses"]}
+    assert uses == {
+        "report mu and b": "with care",  # of the variance the emulator makes more than a tenth
+        "predict this experiment": "yes",
+        "use mu and b in another model": "yes",
+    }
+    (table,) = record["tables"]
+    assert {row[0]: row[1] for row in table["rows"]} == {
+        "mu": "of the forward model",
+        "b": "of the forward model",
+        "c [mN]": "sd of the discrepancy",
+        "psi [mm]": "length of the discrepancy",
+    }
 
 
 def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
@@ -202,6 +220,11 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
     row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
     median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))
     assert median == pytest.approx(3 * (1.1 - 1.1**-2), rel=0.01)  # kPa
+    said = run_in(tmp_path, "predict", "run", "--mode", "planar", "--points", 3, "--out", "planar", "--no-figures")
+    assert said.status == 0, said.err
+    (use,) = json.loads((tmp_path / "planar" / "result.json").read_text())["uses"]
+    assert (use["purpose"], use["verdict"]) == ("predict other loading modes", "with care")  # without a discrepancy
+    assert use["reason"].endswith("if the model is right: its errors are not included")
     said = run_in(tmp_path, "export", "run", "--draws", 2, "--out", "cards")
     assert said.status == 0, said.err
 
@@ -301,6 +324,48 @@ def test_the_posterior_of_the_measurements_is_no_prior_of_them(fitted, file, sou
     assert said.status == 2
     assert "which would count twice" in " ".join(said.err.split())
     assert not list(fitted.glob("out*"))
+
+
+def test_the_stresses_of_every_specimen_are_looked_at_in_a_population(tmp_path):
+    """The short version, of its measurements alone: successive ones, also of every second row."""
+    rows = [("S1", 1.0, 1.5), ("S1", 1.1, 2.5), ("S2", 1.0, 3.5), ("S2", 1.1, 4.5), ("S2", 1.2, 6.5)]
+    text = "specimen,stretch,stress [kPa]\n" + "".join(f"{name},{at},{stress}\n" for name, at, stress in rows)
+    (tmp_path / "data.csv").write_text(text)
+    (tmp_path / "posterior").mkdir()
+    posterior = tmp_path / "posterior" / "new-patient.nc"
+    posterior.touch()
+    for run in (tmp_path, posterior):
+        found = [values.tolist() for values in _stresses_of_specimens(run, 2, 1)]
+        assert found == [[1.5, 2.5], [3.5, 4.5], [4.5, 6.5]]
+    assert [values.tolist() for values in _stresses_of_specimens(tmp_path, 2, 2)] == [[3.5, 6.5]]
+    (tmp_path / "data.csv").write_text("stretch,stress [kPa]\n1.0,1.5\n1.1,2.5\n")  # of a fit, whose posterior has it
+    assert list(_stresses_of_specimens(tmp_path, 2, 1)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rows", "is_one"), [("all", True), ("some, as forces", True), ("another", False)])
+def test_a_specimen_of_a_population_is_not_calibrated_beside_its_posterior(tmp_path, rows, is_one):
+    """The file of the population holds all specimens; what is calibrated, one of them, or some of its rows."""
+    stretch, rng = np.round(np.linspace(1.0, 1.3, 14), 3), np.random.default_rng(6)
+    stresses = {
+        name: np.round(modulus * (stretch - stretch**-2) + 0.02 * rng.standard_normal(14), 4)
+        for name, modulus in (("S1", 5.0), ("S2", 6.0), ("S3", 7.0), ("S4", 6.5))
+    }
+    files = {"all": stresses["S2"], "some, as forces": 0.02 * stresses["S2"], "another": stresses.pop("S4")}
+    lines = [f"{name},{a},{b}" for name, values in stresses.items() for a, b in zip(stretch, values, strict=True)]
+    (tmp_path / "all.csv").write_text("\n".join(["specimen,stretch,stress (kPa)", *lines]) + "\n")
+    said = run_in(tmp_path, "population", "all.csv", "--mode", "uniaxial", "--discrepancy", "none", "--noise-sd", 0.02,
+                  "--no-figures", "--out", "tissue")  # fmt: skip
+    assert said.status == 0, said.err
+    taken = slice(3, 12) if rows == "some, as forces" else slice(None)
+    lines = [f"{a},{b:.5g}" for a, b in zip(stretch[taken], files[rows][taken], strict=True)]
+    (tmp_path / "one.csv").write_text("\n".join(["stretch,measured (kPa)", *lines]) + "\n")
+    (tmp_path / "tension.py").write_text(TENSION)
+    options = ["--forward", "tension.py:stress", "--material", "neo-hookean", "--range", "1:1.3", "--unit", "kPa"]
+    options += ["--prior-run", "tissue", "--noise-sd", 0.02, "--runs", 8, "--no-figures", "--out", "out"]
+    said = run_in(tmp_path, "calibrate", "one.csv", *options)
+    assert said.status == (2 if is_one else 0), said.err
+    assert ("which would count twice" in " ".join(said.err.split())) is is_one
 
 
 def test_the_posterior_of_other_measurements_is_a_prior(fitted):

@@ -72,6 +72,7 @@ def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, he
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "got the card of neo-hookean" in page
     assert "<td>C10 [kPa]" in page
+    assert "Report C10:" in page
     (number,) = [n for n in json.loads((here / "out" / "result.json").read_text())["numbers"] if n["name"] == "C10"]
     assert number["text"].split()[1] == "kPa"
     units = {row["parameter"]: row["unit"] for row in rows_of(here / "out" / "summary.csv")}

@@ -87,6 +87,18 @@ def test_a_run_that_is_typed_is_one_of_the_current_folder_also_beside_a_config(c
     assert "give the RUN folder" in cli("design", "--target", "modulus").err
 
 
+def test_a_run_is_the_one_that_was_typed_where_the_folder_of_the_recipe_is_a_symbolic_link(cli, run, here):
+    (here / "deep" / "mine").mkdir(parents=True)
+    (here / "mine").symlink_to("deep/mine")
+    (here / "mine" / "tests.toml").write_text('candidates = ["planar 1:1.5 20"]\n')
+    options = ["--no-figures", "--out", "mine/ranked"]
+    said = cli("design", os.path.relpath(run), "--config", "mine/tests.toml", *options)
+    assert said.status == 0, said.err
+    again = cli("design", "--config", "mine/ranked/run.toml", "--no-figures", "--out", "again")
+    assert again.status == 0, again.err
+    assert rows_of(here / "again") == rows_of(here / "mine" / "ranked")
+
+
 def test_what_to_do_next_repeats_the_modes_and_what_the_interval_is_of(cli, here, specimen):
     assert cli("fit", specimen, "--estimand", "as-tested", "--noise-sd", 1, "--no-figures", "--out", "run").status == 0
     said = cli("design", "run", *TESTS[:2], "--no-figures")

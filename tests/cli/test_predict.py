@@ -45,6 +45,16 @@ def test_a_mode_is_predicted(cli, here, run):
     assert (here / "run-planar" / "figures" / "prediction.png").exists()
 
 
+def test_a_prediction_in_a_folder_behind_a_symbolic_link_is_repeated(cli, here, run):
+    (here / "deep" / "mine").mkdir(parents=True)
+    (here / "mine").symlink_to("deep/mine")
+    options = ["--mode", "planar", "--points", 3, "--discrepancy", "none", "--no-figures", "--out", "mine/planar"]
+    assert cli("predict", run, *options).status == 0
+    again = cli("predict", "--config", "mine/planar/run.toml", "--no-figures", "--out", "again")
+    assert again.status == 0, again.err
+    assert rows_of(here / "again") == rows_of(here / "mine" / "planar")
+
+
 def test_the_name_of_a_file_says_its_mode_as_for_a_fit(cli, here, run):
     (here / "planar sheet.csv").write_text(PLANAR_KPA.partition("\n")[2])
     said = cli("predict", run, "--data", "planar sheet.csv", "--discrepancy", "none", "--no-figures", "--out", "out")

@@ -53,6 +53,7 @@ def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
             "predict", "two", option, "mooney-rivlin", "--mode", "planar", "--no-figures", "--out", f"p{number}"
         )
         assert predicted.status == 0, predicted.err
+        assert f"tissuq predict two {option} mooney-rivlin --mode planar --data" in " ".join(predicted.out.split())
     assert (here / "p0" / "prediction.csv").read_bytes() == (here / "p1" / "prediction.csv").read_bytes()
     again = cli("predict", "--config", "p0/run.toml", "--no-figures", "--out", "again")
     assert (again.status, (here / "again" / "prediction.csv").read_bytes()) == (

@@ -463,6 +463,9 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert "finite elements" in next_step_of(population, [], uses=not_predicted)
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
     assert next_step_of(population, [at_rest], uses=useless).startswith("take off what the load cell shows at rest")
+    said = next_step_of(population, [at_rest], already_without=["d"], uses=useless, at_rest=["a"])
+    assert said.startswith("take off what the load cell shows at rest in a, as the warning about it says")
+    assert said.endswith("or leave it out: --without d --without a")
     apart, departing = ([Use(PREDICTING, Verdict.NO, reason)] for reason in (CONTRADICTING, DEPARTING))
     assert next_step_of(population, [], uses=apart).startswith("find out why the tests of a specimen contradict")
     assert next_step_of(population, [], uses=departing).endswith("--discrepancy auto")
@@ -488,11 +491,13 @@ def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_tha
     monkeypatch.setattr(population_in_words, "shares_of_discrepancy", lambda share: (share, None))
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
 
-    def said(shares, warnings=()):
+    def said(shares, warnings=(), **which):
         fits = {name: SimpleNamespace(solution=Share(share)) for name, share in zip("abc", shares, strict=True)}
         law = SimpleNamespace(model=SimpleNamespace(material=SimpleNamespace(name="demiray")))
         pooled = SimpleNamespace(posteriors=fits, complete=law)
-        return population_in_words.about_law(pooled, population_in_words.share_of_discrepancy(pooled, warnings))
+        return population_in_words.about_law(
+            pooled, population_in_words.share_of_discrepancy(pooled, warnings, **which)
+        )
 
     class Share(tuple):
         model = None
@@ -501,5 +506,6 @@ def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_tha
     assert "demiray alone is wrong here: the discrepancy carries 40 % of the stress" in said(clear)
     assert said(clear).endswith("cards of a new specimen are of demiray alone.")
     assert said(clear, [at_rest]) == ""
+    assert "carries 50 % of the stress" in said(clear, [at_rest], at_rest=["a"])
     assert said([(0.1, 0.0, 0.2)] * 2 + clear[2:]) == ""
     assert said([(0.9, 0.3, 1.5)] * 2 + clear[2:]) == ""

@@ -71,6 +71,25 @@ def test_what_is_wrong_with_measurements_stands_against_both(alike, code):
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
 
 
+AT_REST = ResultWarning("s0: there is stress.", "stress-at-rest")
+
+
+def test_stress_at_rest_in_few_specimens_calls_for_care_where_it_hardly_moves_the_tissue(alike, monkeypatch):
+    uses = uses_of_population(alike, [band(0.1)], (AT_REST,), at_rest=("s0",))
+    assert [use.verdict for use in uses] == [Verdict.CARE, Verdict.CARE]
+    assert all(use.reason.endswith("; there is stress at rest in s0") for use in uses)
+    assert "known to ±" in uses[0].reason
+    monkeypatch.setattr("tissuq.population.uses._half_width", lambda _: 0.01)  # s0 is 17 % softer than the others
+    uses = uses_of_population(alike, [band(0.1)], (AT_REST,), at_rest=("s0",))
+    assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
+    assert uses[0].reason.startswith("there is stress at rest in s0, so that moduli may be off")
+
+
+def test_stress_at_rest_in_half_of_the_specimens_stands_against_both(alike):
+    uses = uses_of_population(alike, [band(0.1)], (AT_REST,), at_rest=("s0", "s1", "s2"))
+    assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
+
+
 @pytest.mark.parametrize(("severity", "is_doubted"), [(Severity.CAUTION, True), (Severity.NOTE, False)])
 def test_doubtful_measurements_of_a_specimen_call_for_care(monkeypatch, severity, is_doubted):
     monkeypatch.setattr("tissuq.population.uses._reporting", lambda _: (Verdict.YES, "known"))

@@ -41,6 +41,21 @@ def test_the_best_for_left_out_measurements_is_that_with_the_largest_elpd_and_ot
         assert (row[5] == "0.0 ± 0.0") == (row[0] == best)
 
 
+def test_the_parameter_comes_first_and_fits_that_predict_as_well_as_the_best_are_named(table):
+    parameter = f"median of {table['parameter'].iloc[0]}, over the fits"
+    alike = table.assign(
+        median=0.0215, elpd_difference=[0.0, 1.0, 9.0, 3.0], elpd_difference_error=[0.0, 1.0, 1.0, 2.0]
+    )
+    alike = alike.assign(elpd=-alike["elpd_difference"], log_evidence=[9.0, 0.0, 0.0, 0.0])
+    alike = alike.assign(probability=[0.997, 0.001, 0.001, 0.001])
+    numbers = comparison_result(alike, ["runs/a"], KPA).numbers
+    assert [number.name for number in numbers] == [parameter, "largest evidence", "best for left-out measurements"]
+    assert numbers[0].value == "21.5 kPa"  # one number where all are the same
+    assert numbers[1].remark == "probability more than 99 %"
+    one, other = table.index[1], table.index[3]
+    assert (numbers[2].value, numbers[2].remark) == (table.index[0], f"as good: {one}, {other}")
+
+
 def test_what_is_far_below_is_told_at_the_edge(table):
     far = table.copy()
     far.loc["none", "log_bayes_factor"] = -12_345.0

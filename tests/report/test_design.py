@@ -12,7 +12,7 @@ import pytest
 import tissuq as tq
 from tissuq.next_test.candidates import target_named
 from tissuq.report.design import _best, design_figure, design_result, design_table
-from tissuq.report.result import Result
+from tissuq.report.result import Result, Table
 from tissuq.report.writer import write_result
 from tissuq.result_warning import ResultWarning
 from tissuq.studies.design import DesignSettings, DesignStudy
@@ -40,6 +40,26 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     assert table.title.endswith("kPa now")
     assert "kPa" not in design_table(study, second).title
     assert rows[-1][1:3] == ["", ""]
+
+
+def test_the_next_step_says_where_the_same_test_again_is_as_good(study, tmp_path):
+    repeats, words = study.table["is_repeat"], "(the same test again lowers it as much), and fit it together"
+    for loss, is_said in ((0.005, True), (0.03, False)):
+        best = study.table.loc[~repeats & (study.table["target"] == "modulus"), "reduction"].max()
+        table = study.table.assign(reduction=study.table["reduction"].mask(repeats, best - loss))
+        result = design_result(replace(study, table=table), study.settings, tmp_path / "run")
+        assert (words in result.next_step) is is_said
+
+
+def test_a_table_beneath_the_answer_has_the_ten_best_tests_and_a_folded_one_has_all(study, tmp_path):
+    result = design_result(study, study.settings, tmp_path / "run")
+    folded = [block for block in result.sections[0].blocks if isinstance(block, Table)]
+    assert result.sections[0].title == "Every test"
+    for target, short, long in zip(("modulus", "Jm"), result.tables, folded, strict=True):
+        tests = study.table["candidate"][study.table["target"] == target].tolist()
+        assert [row[0] for row in short.rows] == tests[:10]
+        assert short.note == f"{len(tests) - 10} more tests under 'Every test', and in design.csv."
+        assert ([row[0] for row in long.rows], long.note) == (tests, "")
 
 
 def test_tests_that_are_as_good_as_the_best_are_named_with_it(study):

@@ -10,8 +10,11 @@ import pandas as pd
 import pytest
 
 import tissuq as tq
+from tissuq.assessment.answer import Answer
+from tissuq.assessment.next_step import STEPS
+from tissuq.assessment.uses import Use, Verdict
 from tissuq.experiments.units import stress_unit
-from tissuq.report.laws import _numbers, columns_of_laws, law_lead
+from tissuq.report.laws import _next_step, _numbers, columns_of_laws, law_lead
 from tissuq.studies.laws import LawStudy
 
 
@@ -91,3 +94,30 @@ def test_laws_that_are_as_good_as_the_best_are_named_where_they_are_few_and_a_sh
     share = columns_of_laws(stress_unit("MPa"))["share of discrepancy"]
     assert share(row) == "50 %"
     assert share(row.replace(0.5, 1.7)) == "> 100 %"
+
+
+YES, CARE, NO = Verdict
+PURPOSES = ("report the modulus", "predict these tests", "predict other loading modes", "simulate with finite elements")
+GENT_BUT = "gent is as good as any here, but"
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "step", "is_of_all", "words"),
+    [
+        ((YES, YES, NO, NO), "second mode", True, "continue with gent, which is as good as any here: measure a second"),
+        ((CARE, CARE, CARE, CARE), "export", True, "continue with gent, which is as good as any here: take it"),
+        ((CARE, CARE, CARE, CARE), "apart", True, "find out why the tests contradict each other, as the warning says. "
+         "As good as any here is gent: tissuq predict {run} --material gent"),
+        ((NO, CARE, NO, NO), "design", True, f"{GENT_BUT} serves only to predict these tests: see which"),
+        ((YES, NO, NO, NO), "design", True, f"{GENT_BUT} serves only to report the modulus: see which"),
+        ((NO, NO, NO, NO), "apart", True, f"{GENT_BUT} is of no use yet: find out why the tests"),
+        ((NO, YES, CARE, CARE), "law", False, f"{GENT_BUT} serves only to predict these tests and to predict other "
+         "loading modes and to simulate with finite elements: see whether another law describes"),
+        ((NO, YES, NO, NO), "law", True, f"{GENT_BUT} serves only to predict these tests: see which test would make it "
+         "narrower: tissuq design {run} --material gent"),
+    ],
+)  # fmt: skip
+def test_the_next_step_continues_with_a_law_only_where_its_verdicts_allow_it(verdicts, step, is_of_all, words):
+    uses = tuple(Use(purpose, verdict, "") for purpose, verdict in zip(PURPOSES, verdicts, strict=True))
+    said = _next_step("gent", Answer((), "", uses, STEPS[step]), is_of_all=is_of_all)
+    assert said.startswith(words)

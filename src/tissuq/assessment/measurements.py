@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -18,6 +19,9 @@ MIN_MEASUREMENTS = 12
 """Smallest number of measurements that describe how the stress deviates from the material."""
 NEAR_STRAIN_SHARE = 0.15
 """Share of the largest strain within which a measurement is near the reference."""
+
+MIN_CHANGE, MIN_ERRORS = 0.2, 4.0
+"""Change of the ratio of two tests' stresses along them, over its middle, that is told, and its standard errors."""
 
 
 def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
@@ -50,12 +54,71 @@ def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
             "no-direction-looked-for",
             Severity.NOTE,
         )
+    yield from _differing_tests(experiment)
     if experiment.size < MIN_MEASUREMENTS:
         yield ResultWarning(
             f"{experiment.size} measurements are too few to show how the stress deviates from the material: "
             f"measure at {MIN_MEASUREMENTS} stretches or more.",
             "few-measurements",
         )
+
+
+def _differing_tests(experiment: Experiment) -> Iterator[ResultWarning]:
+    """Yield a warning about two tests that were loaded alike, whose stresses are in another ratio at either end.
+
+    An error of load or area is one factor along a test. Of tests that are taken for those of two specimens it is a
+    note.
+    """
+    labelled = list(zip(labels_of_tests(experiment.tests), experiment.tests, strict=True))
+    differing = []
+    for (name, one), (other_name, other) in combinations(labelled, 2):
+        is_one = bool(one.specimen) and one.specimen == other.specimen
+        if (is_one or len(labelled) == 2) and (ratios := _ratios(one, other)):
+            differing.append((abs(ratios[1] - ratios[0]), is_one, f"of '{name}' over that of '{other_name}'", ratios))
+    if not differing:
+        return
+    _, is_one, of_which, (at_rest, at_reach, reach) = max(differing)
+    control = experiment.curves[0].mode.controls[0].name
+    words = f"the stress {of_which} is {at_rest:.2g} near rest and {at_reach:.2g} at {control} {reach:.3g}"
+    if is_one:
+        yield ResultWarning(
+            f"two tests of one specimen contradict each other: {words}, which is no error of load or area. No "
+            "isotropic material gives both: see whether direction, speed or state of the specimen differed, and fit "
+            "each by itself.",
+            "contradicting-tests",
+        )
+    else:
+        yield ResultWarning(
+            f"{words}. It is taken for a difference between two specimens: if it is one between two directions or "
+            "states of one material, no isotropic material gives both, so fit each by itself.",
+            severity=Severity.NOTE,
+        )
+
+
+def _ratios(one: Experiment, other: Experiment) -> tuple[float, float, float] | None:
+    """Return the ratio of the stresses of two tests at rest, at the reach of both, and this; None where it is the same.
+
+    It is taken to be linear in the strain, by least squares at the points of the first test.
+    """
+    if one.mode != other.mode or len(one.curves) + len(other.curves) > 2 or len(one.mode.controls) > 1:
+        return None
+    reference = one.mode.controls[0].reference
+    strain, other_strain = (test.curves[0].abscissa - reference for test in (one, other))
+    sign = 1.0 if strain.max() > -strain.min() else -1.0
+    reach = min(float((sign * strain).max()), float((sign * other_strain).max()))
+    order, is_common = np.argsort(other_strain, kind="stable"), (sign * strain > 0) & (sign * strain <= reach)
+    if is_common.sum() < MIN_MEASUREMENTS:
+        return None
+    stress = np.interp(strain[is_common], other_strain[order], other.curves[0].stress[order])
+    columns = stress[:, None] * np.column_stack([np.ones(len(stress)), sign * strain[is_common] / reach])
+    weights, squares, rank, _ = np.linalg.lstsq(columns, one.curves[0].stress[is_common], rcond=None)
+    if rank < 2 or weights[0] <= 0 or weights.sum() <= 0:
+        return None
+    variance = float(squares[0]) / (len(stress) - 2) * np.linalg.inv(columns.T @ columns)[1, 1]
+    change, middle = abs(float(weights[1])), float(weights[0] + weights[1] / 2)
+    if change < MIN_CHANGE * middle or change < MIN_ERRORS * np.sqrt(variance):
+        return None
+    return float(weights[0]), float(weights.sum()), reference + sign * reach
 
 
 def factors_of_tests(solution: Solution) -> dict[str, float]:

@@ -21,6 +21,7 @@ from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
 __all__ = [
+    "MIN_INSIDE",
     "MIN_OFTEN_STABLE",
     "MIN_STABLE",
     "PRECISE",
@@ -290,7 +291,8 @@ def _simulating(
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
-    share = f"{100 * worst.probability:.0f} % of the draws are stable within the measured strains"
+    origin = "measured" if solution.is_of_data else "stated"
+    share = f"{100 * worst.probability:.0f} % of the draws are stable within the {origin} strains"
     if worst.probability < MIN_STABLE:
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:
@@ -301,4 +303,4 @@ def _simulating(
     stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
     if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
         return Verdict.CARE, f"as uncertain as the other loading modes above; {share}"
-    return worst_of(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"
+    return worst_of(stable, other_modes[0]), f"{share}; what leaves the {origin} strains is extrapolated"

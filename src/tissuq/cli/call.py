@@ -206,7 +206,7 @@ class Call(Generic[Kind, How]):
         """Print the numbers of a result, with --quiet alone, which leaves all else out."""
         for number in numbers if self.monitor.is_quiet else ():
             remark = f", {number['remark']}" if number["remark"] else ""
-            print(f"{number['name']}: {number['text']}{remark}", file=self.out)
+            print(f"{number['name'].removesuffix(':')}: {number['text']}{remark}", file=self.out)
 
 
 def _shown(files: Any) -> str:

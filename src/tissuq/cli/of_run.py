@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -15,6 +14,7 @@ from tissuq.studies.files_of_tests import resolve
 from tissuq.studies.model_settings import CardOptions
 from tissuq.studies.option import option, sampling
 from tissuq.studies.run_settings import DesignSettings, PredictionSettings, RunSettings
+from tissuq.studies.settings import seen_from
 
 if TYPE_CHECKING:
     from tissuq.posterior.drawn_materials import Sampling
@@ -59,7 +59,7 @@ def design(call: Call[DesignSettings, OfRun]) -> None:
 
     def beside_settings(name: str) -> str:  # where all names of the settings count from
         is_from_here = not call.config or Path(name).is_absolute()
-        return str(name) if is_from_here else os.path.relpath(name, call.beside)
+        return str(name) if is_from_here else seen_from(call.beside, name)
 
     typed = tuple(with_folder(name, beside_settings) for name in call.stated.get("targets", ()))
     settings = call.loaded(run=beside_settings(stated) if stated else None, targets=typed or None)
@@ -67,7 +67,7 @@ def design(call: Call[DesignSettings, OfRun]) -> None:
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=call.beside / settings.run)
 
     def from_target(name: str) -> str:
-        return os.path.relpath((call.beside / name).resolve(), target.resolve())
+        return seen_from(target, call.beside / name)
 
     targets = tuple(with_folder(name, from_target) for name in settings.targets)
     recipe = settings.model_copy(update={"run": from_target(settings.run), "targets": targets})

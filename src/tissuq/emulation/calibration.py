@@ -19,6 +19,7 @@ from tissuq.inference.marginal import Marginal
 from tissuq.parameters.checks import check_probability
 from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.prediction.bands import Mixtures
+from tissuq.result_warning import ResultWarning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,8 +122,8 @@ class Calibration:
         return Likelihood(self.problem, self.emulator)
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings that the user must read, in sentences."""
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Warnings that the user must read: sentences, each with a code and a severity."""
         exact = self.without_emulator_error.posterior
         sentences = calibration_warnings(
             self.problem,

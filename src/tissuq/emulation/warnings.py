@@ -1,4 +1,4 @@
-"""Warnings about a calibration, in sentences."""
+"""Warnings about a calibration: sentences with codes."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from tissuq.emulation.problem import Problem, is_far
 from tissuq.emulation.runs import EmulatorCheck
 from tissuq.experiments.smoothing import scatter
 from tissuq.model.discrepancy import PinnedProcess
+from tissuq.result_warning import ResultWarning, Severity
 
 if TYPE_CHECKING:
     from tissuq.emulation.likelihood import Likelihood
@@ -52,16 +53,20 @@ said to have no effect."""
 DRAWS_NEAR_FAILURES = 400
 """Number of draws from which that share is computed."""
 DISCREPANCY_WARNINGS = {
-    "none": (
+    "none": ResultWarning(
         "no error of the forward model is allowed for: where the model is wrong, its parameters are over-confident, "
-        "and the interval does not show it."
+        "and the interval does not show it.",
+        "no-discrepancy",
     ),
-    "gp": (
+    "gp": ResultWarning(
         "the discrepancy has initial stiffness of its own, and takes it from the parameters: in tests, its intervals "
-        "cover the initial modulus far less often than stated (docs/expensive-models.md). Prefer gp-pinned."
+        "cover the initial modulus far less often than stated (docs/expensive-models.md). Prefer gp-pinned.",
+        "free-discrepancy",
     ),
-    "gp-pinned": (
-        "the initial stiffness is left to the parameters; the learnt discrepancy holds for this experiment only."
+    "gp-pinned": ResultWarning(
+        "the initial stiffness is left to the parameters; the learnt discrepancy holds for this experiment only.",
+        "free-discrepancy",
+        Severity.NOTE,
     ),
 }
 """Warning that belongs to each discrepancy beside a forward model."""
@@ -76,7 +81,7 @@ def calibration_warnings(
     emulator_share: Mapping[str, float],
     totals: Mapping[str, float],
     likelihood: Likelihood,
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     """Yield the warnings that a calibration carries, the gravest first.
 
     Parameters
@@ -94,11 +99,12 @@ def calibration_warnings(
     likelihood : Likelihood
     """
     if not posterior.converged:
-        yield posterior.verdict
+        yield ResultWarning(posterior.verdict, "not-converged", Severity.PROBLEM)
     if without_effect := list(_without_effect(problem, posterior, totals)):
-        yield (
+        yield ResultWarning(
             f"the model hardly depends on {', '.join(without_effect)}, and the result is the prior: see whether the "
-            "model reads a parameter of this name (--prior)."
+            "model reads a parameter of this name (--prior).",
+            "poorly-determined",
         )
     yield from _far_from_zero_load(problem)
     none_fit = list(_no_parameters_fit(problem, emulator, posterior, likelihood))
@@ -111,28 +117,31 @@ def calibration_warnings(
             if share > MAX_SHARE_NEAR_FAILURES
             else "The posterior is not near them."
         )
-        yield f"{emulator.runs.failure_summary} {position}"
+        severity = Severity.CAUTION if share > MAX_SHARE_NEAR_FAILURES else Severity.NOTE
+        yield ResultWarning(f"{emulator.runs.failure_summary} {position}", "inaccurate-emulator", severity)
     if not none_fit:  # of which there is nothing to be made more accurate
         yield from _large_error(problem, posterior, exact, emulator_share)
     yield from _over_confident(check)
     at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
-        yield (
+        yield ResultWarning(
             f"the posterior lies beyond the runs of the model in {', '.join(beyond_runs)}, which lie where its prior "
             "is: the emulator extrapolates, or the prior contradicts the measurements. Let runs be placed where the "
-            "posterior is (refine)."
+            "posterior is (refine).",
+            "inaccurate-emulator",
         )
     if at_bounds:
-        yield (
+        yield ResultWarning(
             f"the posterior reaches the bound of the prior of {', '.join(at_bounds)}: there the prior, not the data, "
-            "decides. Give a wider prior, unless the bound is intended."
+            "decides. Give a wider prior, unless the bound is intended.",
+            "prior-bound",
         )
     yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
 
 
 def _no_parameters_fit(
     problem: Problem, emulator: Emulator, posterior: SampledPosterior, likelihood: Likelihood
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     """Yield a warning where the measurements cannot be what the model gives at any parameters, beyond all errors."""
     from scipy.special import gammaincc
 
@@ -158,7 +167,7 @@ def _no_parameters_fit(
     off = _rms(outputs[nearest, start:stop] - measured[start:stop])
     named = [f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, points[nearest], strict=True)]
     away = np.sqrt(misfit / size)
-    yield (
+    yield ResultWarning(
         f"{NO_PARAMETERS_FIT}: "
         + (
             "a discrepancy or a noise takes up the whole difference. "
@@ -171,7 +180,9 @@ def _no_parameters_fit(
         f"{problem.control[worst]:.4g}: measured {measured[worst]:.4g}, model {outputs[nearest, worst]:.4g}. "
         f"{is_out.sum()} of {size} measurements are "
         "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
-        "model (discrepancy gp-pinned)."
+        "model (discrepancy gp-pinned).",
+        "unmodelled-curve",
+        Severity.PROBLEM,
     )
 
 
@@ -184,7 +195,7 @@ def _without_effect(problem: Problem, posterior: SampledPosterior, totals: Mappi
                 yield symbol
 
 
-def _far_from_zero_load(problem: Problem) -> Iterator[str]:
+def _far_from_zero_load(problem: Problem) -> Iterator[ResultWarning]:
     """Yield a warning where a process is pinned so far from the measurements that it is free at all of them."""
     if not isinstance(problem.discrepancy, PinnedProcess):
         return
@@ -192,11 +203,12 @@ def _far_from_zero_load(problem: Problem) -> Iterator[str]:
     for name, (start, stop) in problem.quantities.items():
         control = problem.control[start:stop]
         if is_far(control, zero_load):
-            yield (
+            yield ResultWarning(
                 f"gp-pinned is zero at the control {zero_load:g} (--zero-load), which is far from those "
                 f"{f'of {name} ' if name else ''}that were measured, {control.min():.4g} to {control.max():.4g}: the "
                 "discrepancy then takes a share of the initial stiffness, as gp does. Give the control at which there "
-                "is no load: of stretches --zero-load 1."
+                "is no load: of stretches --zero-load 1.",
+                "free-discrepancy",
             )
 
 
@@ -223,7 +235,7 @@ def _noise_is_misfit(problem: Problem, predicted: FloatArray) -> bool:
 
 def _large_error(
     problem: Problem, posterior: SampledPosterior, exact: SampledPosterior, emulator_share: Mapping[str, float]
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     """Yield a warning where the emulator's error widens or shifts the posterior notably."""
     forward = problem.forward_symbols
     shifts = {
@@ -234,26 +246,29 @@ def _large_error(
     largest_shift = max(forward, key=lambda symbol: shifts[symbol])
     advice = "Give more runs, or let some be placed where the posterior is (refine)."
     if emulator_share[largest_share] > MIN_EMULATOR_SHARE:
-        yield (
+        yield ResultWarning(
             f"the emulator's error is large beside the noise: it makes {100 * emulator_share[largest_share]:.0f} % of "
-            f"the posterior variance of {largest_share}. {advice}"
+            f"the posterior variance of {largest_share}. {advice}",
+            "inaccurate-emulator",
         )
     elif shifts[largest_shift] > MAX_MEAN_SHIFT:
         shift = shifts[largest_shift]
         multiple = f"{shift:.1f}" if shift < MAX_SHIFT_IN_SDS else f"more than {MAX_SHIFT_IN_SDS}"
-        yield (
+        yield ResultWarning(
             f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by {multiple} "
-            f"standard deviations. {advice}"
+            f"standard deviations. {advice}",
+            "inaccurate-emulator",
         )
 
 
-def _over_confident(check: EmulatorCheck) -> Iterator[str]:
+def _over_confident(check: EmulatorCheck) -> Iterator[ResultWarning]:
     """Yield a warning where the errors of the emulator are larger than it says."""
     if check.rms_standardised > MAX_RMS_STANDARDISED:
-        yield (
+        yield ResultWarning(
             "the emulator is over-confident: runs predicted from the others are off by "
             f"{check.rms_standardised:.1f} of its standard deviations (root mean square; 1 is right). Where the model "
-            "is not smooth in its parameters, try the kernel matern-5/2; otherwise give more runs."
+            "is not smooth in its parameters, try the kernel matern-5/2; otherwise give more runs.",
+            "inaccurate-emulator",
         )
 
 

@@ -32,7 +32,11 @@ DEPARTING = "the fitted curves of most specimens depart from the measured ones, 
 
 
 def uses_of_population(
-    population: Population, bands: Sequence[Band], warnings: Sequence[str], quantity: str = "modulus"
+    population: Population,
+    bands: Sequence[Band],
+    warnings: Sequence[str],
+    quantity: str = "modulus",
+    at_rest: Sequence[str] = (),
 ) -> tuple[Use, ...]:
     """Return for what a population can be used, by the limits that hold for the fit of a specimen.
 
@@ -45,14 +49,17 @@ def uses_of_population(
         Those that the population carries, and those about its measurements.
     quantity : str
         What the first pooled parameter is, or stands for.
+    at_rest : sequence of str
+        The specimens with stress at rest, where it is known which of them have it: a few may leave the numbers of the
+        tissue as they are.
     """
-    against = _reason_against(population, warnings)
+    against = _reason_against(population, warnings, at_rest)
     purposes = (f"report the {quantity} of the tissue", PREDICTING)
     if against:
         return tuple(Use(purpose, Verdict.NO, against) for purpose in purposes)
     judged = (_reporting(population), _predicting(population, bands))
     return tuple(
-        Use(purpose, *_beside_measurements(warnings, *verdict))
+        Use(purpose, *_beside_measurements(warnings, at_rest, *verdict))
         for purpose, verdict in zip(purposes, judged, strict=True)
     )
 
@@ -63,22 +70,45 @@ def share_of_initial_stiffness(population: Population) -> float:
     return float(np.median(shares))
 
 
-def _reason_against(population: Population, warnings: Sequence[str]) -> str:
+def _reason_against(population: Population, warnings: Sequence[str], at_rest: Sequence[str]) -> str:
     """Return what stands against any use; nothing where nothing does."""
     far = ", ".join(far_specimens(population))
     reasons = {
         "sampling has not converged": not population.converged,
         "what was read of the files is doubtful, as the warning says": has_code(warnings, "doubtful-reading"),
         f"{far} differs from the others as much as by a mistaken unit, as the warning says": bool(far),
-        "there is stress at rest, so that moduli may be off by far more than their intervals": (
-            has_code(warnings, "stress-at-rest")
-        ),
+        f"there is stress at rest{_of_few(population, at_rest)}, so that moduli may be off by far more than their "
+        "intervals": has_code(warnings, "stress-at-rest") and not _are_beside(population, at_rest),
         "the discrepancy aims at the best fit, not at the parameters": (
             population.complete.model.discrepancy.is_best_fit
         ),
     }
     found = next((reason for reason, applies in reasons.items() if applies), "")
     return found or _against_most_fits(population)
+
+
+def _of_few(population: Population, names: Sequence[str]) -> str:
+    """Return which specimens it is of, as the end of a clause, where these are less than half."""
+    return f" in {', '.join(names)}" if 0 < 2 * len(names) < len(population.names) else ""
+
+
+def _are_beside(population: Population, names: Sequence[str]) -> bool:
+    """Return whether specimens are less than half, and their moduli move the middle of all within its interval."""
+    if not _of_few(population, names):
+        return False
+    moduli = {name: posterior.initial_shear_modulus.mean for name, posterior in population.posteriors.items()}
+    if min(moduli.values()) <= 0:
+        return False
+    logarithms = {name: np.log(modulus) for name, modulus in moduli.items()}
+    others = [value for name, value in logarithms.items() if name not in names]
+    shift = abs(np.expm1(np.mean([*logarithms.values()]) - np.mean(others)))
+    return bool(shift <= _half_width(population))
+
+
+def _half_width(population: Population) -> float:
+    """Return half the 95 % interval of the median over specimens of the first pooled parameter, over that median."""
+    numbers = numbers_of(population.summary(unit="MPa"))[population.symbols[0], "median"]
+    return float((numbers["hdi_high"] - numbers["hdi_low"]) / 2 / abs(numbers["median"]))
 
 
 def _against_most_fits(population: Population) -> str:
@@ -99,9 +129,7 @@ def _reporting(population: Population) -> tuple[Verdict, str]:
     if carried > PRECISE:
         of_stiffness = f"{100 * carried:.0f} % of the initial stiffness (median of the specimens)"
         return Verdict.NO, f"the discrepancy carries {of_stiffness}, by which it may be off"
-    numbers = numbers_of(population.summary(unit="MPa"))[population.symbols[0], "median"]
-    half_width = (numbers["hdi_high"] - numbers["hdi_low"]) / 2 / abs(numbers["median"])
-    verdict, width = precision_of(half_width)
+    verdict, width = precision_of(_half_width(population))
     return _beside_law(population, verdict, f"median over specimens {width}")
 
 
@@ -119,8 +147,15 @@ def _predicting(population: Population, bands: Sequence[Band]) -> tuple[Verdict,
     return _beside_law(population, verdict, sentence)
 
 
-def _beside_measurements(warnings: Sequence[str], verdict: Verdict, sentence: str) -> tuple[Verdict, str]:
+def _beside_measurements(
+    warnings: Sequence[str], at_rest: Sequence[str], verdict: Verdict, sentence: str
+) -> tuple[Verdict, str]:
     """Return a verdict with the doubt that warnings about the measurements of specimens, notes aside, leave."""
+    if at_rest:
+        verdict, sentence = (
+            worst_of(verdict, Verdict.CARE),
+            f"{sentence}; there is stress at rest in {', '.join(at_rest)}",
+        )
     if any(has_code([w], "measurements") and getattr(w, "severity", None) is not Severity.NOTE for w in warnings):
         return worst_of(verdict, Verdict.CARE), f"{sentence}; see the warning about the measurements"
     return verdict, sentence

@@ -17,7 +17,7 @@ from tissuq.report.tables import significant
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["LABELS", "SHARES", "Bands", "handy_unit", "percent_of"]
+__all__ = ["LABELS", "OF_RANGES", "SHARES", "Bands", "handy_unit", "percent_of"]
 
 UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
 SHARES = {
@@ -36,6 +36,11 @@ OF_SOURCES = (
 IN_THE_OTHERS = (
     "How draws go on beyond the measured range, and the factor that all tests have in common, are within these shares: "
     "it takes more draws to tell them apart."
+)
+
+OF_RANGES = (
+    "After ± stands the standard error from the number of draws (bootstrap); a range is the share within one such "
+    "error, where few draws put that below 0 or above 100 %."
 )
 
 
@@ -157,6 +162,17 @@ class Bands:
 
 
 def _share_cell(row: dict[str, Any], name: str) -> str:
-    """Return the share of the variance that is due to a source, with its standard error."""
-    share, error = row[name], row[f"{name}_error"]
-    return "" if np.isnan(share) else f"{100 * share:.0f} ± {100 * error:.0f} %"
+    """Return the share of the variance that is due to a source, with its standard error.
+
+    Of few draws the estimate, or one error beside it, may lie below 0 or above 100 %: then a range within these stands,
+    unless the share is significantly beyond, as of parts that compensate each other.
+    """
+    share, error = 100 * row[name], 100 * row[f"{name}_error"]
+    if np.isnan(share):
+        return ""
+    low, high = share - error, share + error
+    is_beyond = share - SIGNIFICANT_ERRORS * error > 100 or share + SIGNIFICANT_ERRORS * error < 0
+    if is_beyond or not (low < 0 or high > 100):
+        return f"{share:.0f} ± {error:.0f} %"
+    ends = [f"{min(max(end, 0.0), 100.0):.0f}" for end in (low, high)]
+    return f"{' to '.join(dict.fromkeys(ends))} %"

@@ -11,11 +11,13 @@ import numpy as np
 from tissuq.decks.model_files import MODEL, extra_files, stored_place
 from tissuq.decks.quantity import located
 from tissuq.emulation import DeckForward, SeveralModels
-from tissuq.emulation.problem import is_far
-from tissuq.emulation.warnings import NO_PARAMETERS_FIT
+from tissuq.emulation.problem import symbol_of
+from tissuq.experiments.units import stress_unit
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
+from tissuq.model.noise import NOISE_SD
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
+from tissuq.report.calibration_in_words import finding_of, names_of, next_step_of, uses_of_calibration
 from tissuq.report.inputs import Copies
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
@@ -27,11 +29,16 @@ __all__ = ["calibration_result"]
 
 WORST_RUNS = 8
 """Rows of the page's table of runs that were left out."""
-LARGE_SHARE = 0.1
-"""Share of the variance of a parameter that is due to the emulator, beyond which more runs are worth while."""
 BY_EMULATOR = (
     "Intervals are the shortest that hold 95 %. By emulator: share of the posterior variance caused by the error of "
     "the emulator."
+)
+PARAMETER = "of the forward model"
+OF_ERRORS = {"c": "sd of the discrepancy", "psi": "length of the discrepancy", NOISE_SD.symbol: "sd of the noise"}
+"""What the parameters of a process and of the noise are."""
+DISCREPANCY = (
+    "The discrepancy is the error of the forward model: a curve over the control with this sd, which bends over this "
+    "length."
 )
 EMULATOR = (
     "A Gaussian process replaces the model: its prediction and the variance of its error are part of the likelihood. "
@@ -65,7 +72,12 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     has_discrepancy = calibration.problem.discrepancy.is_correlated
     inside_alone = calibration.predictive_coverage(discrepancy=False)
     remark = f"of the forward model alone: {100 * inside_alone:.0f} %" if has_discrepancy else ""
+    of_law = study.posterior.answer.estimates[:1] if study.posterior is not None else ()
+    to_mpa = stress_unit(settings.unit).to_mpa
     numbers = [
+        Number(name, mean / to_mpa, low / to_mpa, high / to_mpa, settings.unit) for name, mean, low, high in of_law
+    ]
+    numbers += [
         Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""))
         for symbol, marginal in calibration.marginals.items()
         if symbol in calibration.problem.forward_symbols
@@ -73,12 +85,12 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     inside = f"{100 * calibration.predictive_coverage():.0f} % of the measurements"
     return Result(
         command=_repeated(settings.model_copy(update=relocated)),
-        title="Parameters of an expensive forward model",
-        subject=f"{len(calibration.problem.measured)} measurements · forward model {model} · {runs} runs · discrepancy "
-        f"{settings.discrepancy}",
+        title=f"Forward model {model}: {names_of(study)}",
+        subject=f"{len(calibration.problem.measured)} measurements · {runs} runs · discrepancy {settings.discrepancy}",
         numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=remark)),
-        finding=_lead(study),
-        next_step=_next_step(study),
+        finding=finding_of(study),
+        uses=uses_of_calibration(study),
+        next_step=next_step_of(study),
         picture=Picture(
             "answer", lambda: band_figure(calibration, study.data, is_narrow=True),
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
@@ -103,31 +115,6 @@ def _repeated(settings: CalibrationSettings) -> str:
     for option, texts in (("--qoi", settings.quantities), ("--along", settings.along)):
         words += [word for name, text in texts.items() if LAW.fullmatch(text) for word in (option, f"{name}={text}")]
     return shlex.join(["calibrate", *words])
-
-
-def _none_fit(study: CalibrationStudy) -> bool:
-    return any(warning.startswith(NO_PARAMETERS_FIT) for warning in study.warnings)
-
-
-def _next_step(study: CalibrationStudy) -> str:
-    calibration = study.calibration
-    if _none_fit(study):
-        return "check units and signs of data and model (--unit, --factor), and the priors: no parameters fit the data."
-    if not calibration.converged:
-        return "make the posterior converge: repeat the command with --method nuts --force, or narrower priors."
-    if max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols) > LARGE_SHARE:
-        return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."
-    if not calibration.problem.discrepancy.is_correlated:
-        zero = study.settings.zero_load
-        is_unknown = any(is_far(measured.control, zero) for measured in study.data.values())
-        at = " --zero-load C, C the control at which there is no load (of stretches 1)" if is_unknown else ""
-        return f"let the forward model be wrong: repeat the command with --discrepancy gp-pinned --force{at}."
-    if study.posterior is not None:
-        return "take the material further: tissuq predict {run} (export and structure take the run, too)"
-    return (
-        "name the law of the model and the stretches in it: repeat the command with --material LAW --range LOW:HIGH "
-        "--force; predict, export and structure then take the run."
-    )
 
 
 def _copies(study: CalibrationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:
@@ -204,18 +191,22 @@ def _rows(columns: dict[str, Any]) -> list[Row]:
 
 
 def _parameters(study: CalibrationStudy) -> Table:
-    """Return the parameters in the units of the forward model."""
+    """Return the parameters in the units of the forward model, and what each of them is."""
     calibration, rows = study.calibration, []
+    of_errors = {
+        symbol_of(symbol, name): f"{words}{f' of {name}' * bool(name)}"
+        for name in calibration.problem.quantities
+        for symbol, words in OF_ERRORS.items()
+    }
     for symbol, marginal in calibration.marginals.items():
         mean, sd = (interval(number, number, marginal.sd)[0] for number in (marginal.mean, marginal.sd))
         ends = "[{}, {}]".format(*interval(*marginal.hdi(), marginal.sd))
-        share = calibration.emulator_share[symbol]
-        rows.append(
-            [study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{100 * share:.0f} %"]
-        )
-    headers = ["parameter", "mean", "sd", "95 % interval", "ESS", "by emulator"]
-    note = f"{BY_EMULATOR} Emulator, {calibration.check}."
-    return Table(headers, rows, f"{study.forward.name}: {len(calibration.runs)} runs", note=note)
+        words = PARAMETER if symbol in calibration.problem.forward_symbols else of_errors[symbol]
+        rows.append([study.label(symbol), words, mean, sd, ends, f"{100 * calibration.emulator_share[symbol]:.0f} %"])
+    headers = ["parameter", "what it is", "mean", "sd", "95 % interval", "by emulator"]
+    of_discrepancy = f" {DISCREPANCY}" * calibration.problem.discrepancy.is_correlated
+    note = f"{BY_EMULATOR}{of_discrepancy} Emulator, {calibration.check}."
+    return Table(headers, rows, f"{study.forward.name}: {len(calibration.runs)} runs", (1,), note)
 
 
 def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
@@ -297,8 +288,8 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
         f"{whose} vary in {directions} direction{'s' * (directions != 1)}, each a process with the kernel "
         f"{settings.kernel} and a {settings.trend} mean{logarithms}. The variation outside these directions is part of "
         "the error.",
-        f"Posterior by {calibration.posterior.method}. {calibration.posterior.verdict}{evidence} {study.seconds:.0f} s "
-        "in all.",
+        f"Posterior by {calibration.posterior.method}, effective size {min(calibration.posterior.ess.values()):.0f}. "
+        f"{calibration.posterior.verdict}{evidence} {study.seconds:.0f} s in all.",
     )
     priors = [[study.label(symbol), str(prior)] for symbol, prior in calibration.problem.priors.items()]
     blocks: list[Block] = [sentences, Table(["parameter", "prior"], priors, text_columns=(1,))]
@@ -336,29 +327,4 @@ def _model_run(forward: DeckForward, names: tuple[str, ...], study: CalibrationS
         f"{settings.unit} ({forward.cards.system.units}).",
         f"{', '.join(of_file)}, {control} is {forward.along_factor:.6g} times {controlled}: units, signs and symmetry "
         "together. Between the increments of the solver they are interpolated by monotone cubics.",
-    )
-
-
-def _lead(study: CalibrationStudy) -> str:
-    """Return the finding in two sentences."""
-    calibration = study.calibration
-    if _none_fit(study):
-        return f"Not to be used: {NO_PARAMETERS_FIT}, and the intervals are of those that are least far from them."
-    findings = []
-    for symbol in calibration.problem.forward_symbols:
-        marginal = calibration.marginals[symbol]
-        low, high = interval(*marginal.hdi(), marginal.sd)
-        unit = f" {study.units[symbol]}" if symbol in study.units else ""
-        findings.append(f"{symbol} is {low} to {high}{unit}")
-    share = max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols)
-    whose = "" if study.settings.material else ", in the units of the forward model"
-    size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
-    if share > LARGE_SHARE:
-        return (
-            f"Not to be used yet: the error of the emulator contributes {size} to the variance. With it, "
-            f"{', and '.join(findings)}{whose}, with a probability of 95 % each."
-        )
-    return (
-        f"With a probability of 95 % each, {', and '.join(findings)}{whose}. The error of the "
-        f"emulator contributes {size} to their variance."
     )

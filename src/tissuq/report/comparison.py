@@ -14,6 +14,7 @@ from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.experiments.units import StressUnit
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import interval, significant, with_named_units
+from tissuq.studies.laws import SIGNIFICANT_ERRORS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,21 +163,25 @@ def comparison_result(table: pd.DataFrame, runs: list[str], unit: StressUnit) ->
 
 
 def _numbers(table: pd.DataFrame, unit: StressUnit) -> tuple[Number, ...]:
-    """Return the fit with the largest evidence, the one that predicts best, and whether the intervals overlap."""
+    """Return the parameter over the fits and whether its intervals overlap, the most probable and the best fit."""
     numbers = []
-    if table["log_evidence"].notna().any():
-        name = str(table["log_evidence"].idxmax())
-        numbers.append(Number("largest evidence", name, remark=f"probability {100 * table['probability'][name]:.0f} %"))
-    best = str(table["elpd"].idxmax())
-    numbers.append(Number("best for left-out measurements", best, remark=f"stacking {table['stacking'][best]:.2f}"))
     summarised = table.dropna(subset=["median"])
     if len(summarised) and summarised["parameter"].nunique() == 1:
         low, high = (float(end) / unit.to_mpa for end in (summarised["median"].min(), summarised["median"].max()))
         overlap = summarised["hdi_low"].max() <= summarised["hdi_high"].min()
         words = "all 95 % intervals overlap" if overlap else "the 95 % intervals contradict each other"
-        value = f"{significant(low)} to {significant(high)} {unit.name}"
+        value = f"{' to '.join(dict.fromkeys((significant(low), significant(high))))} {unit.name}"
         numbers.append(Number(f"median of {summarised['parameter'].iloc[0]}, over the fits", value, remark=words))
-    return tuple(numbers)
+    if table["log_evidence"].notna().any():
+        name = str(table["log_evidence"].idxmax())
+        share = 100 * table["probability"][name]
+        probability = "more than 99 %" if share > 99 and len(table) > 1 else f"{share:.0f} %"
+        numbers.append(Number("largest evidence", name, remark=f"probability {probability}"))
+    best = str(table["elpd"].idxmax())
+    is_close = table["elpd_difference"] < SIGNIFICANT_ERRORS * table["elpd_difference_error"]
+    as_good = [str(name) for name in table.index[is_close] if name != best]
+    remark = f"as good: {', '.join(as_good)}" if as_good else "no other as good"
+    return (*numbers, Number("best for left-out measurements", best, remark=remark))
 
 
 def _parameter_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:

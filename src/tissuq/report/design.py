@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,9 @@ __all__ = ["design_figure", "design_result", "design_table"]
 
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
+TABLE_ROWS = 10
+"""Number of tests in a table beneath the answer; a folded one has all."""
+EVERY = "Every test"
 MAX_TARGETS = 2
 """Targets in the answer; the finding and the tables have all."""
 FEW_TIES = 2
@@ -38,7 +42,12 @@ CAPTION = (
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
 )
 AFTER_WARNING = "see first to the warning about the fit, whose measurements the ranking takes for right. Then"
-NEXT = "make the first of these tests{whose}, and fit it together with the data: tissuq fit DATA.csv NEW.csv{options}"
+NEXT = (
+    "make the first of these tests{whose}{again}, and fit it together with the data: "
+    "tissuq fit DATA.csv NEW.csv{options}"
+)
+OR_AGAIN, AS_MUCH = " (the same test again lowers it as much)", 0.01
+"""What is said of a repeat of the data, and by how much of the sd now another test must be better."""
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")
 """Columns in the unit of a target."""
@@ -53,15 +62,22 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     measured_errors = {*model.experiment.least_errors, *(("stress", "test") if len(tests) > 1 else ())}
     stated = {name: size for name, size in tolerances.unusual.items() if name not in measured_errors}
     errors += "".join(f" --tolerance {name}={size:g}" for name, size in stated.items())
-    best = next(row.iloc[0] for row in (_ranked(study, target)[0] for target in study.targets) if len(row))
+    ranked, again = next(of_kind for of_kind in map(partial(_ranked, study), study.targets) if len(of_kind[0]))
+    best = ranked.iloc[0]
+    is_as_much = len(again) and again.iloc[-1]["reduction"] > best["reduction"] - AS_MUCH
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
-    test = NEXT.format(whose=" on another specimen" * is_other, options=modes + errors)
+    whose = " on another specimen" * is_other
+    test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=modes + errors)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
 
-def design_table(study: DesignStudy, target: Target) -> Table:
-    """Return the tests for one target in the unit of the data, best first, under how uncertain it is now."""
-    (factor, unit), rows = _unit(study, target), _rows_of(study, target)
+def design_table(study: DesignStudy, target: Target, limit: int | None = None) -> Table:
+    """Return the tests for one target in the unit of the data, best first, under how uncertain it is now.
+
+    With a limit it has so many of the best, and its note says where the others are.
+    """
+    (factor, unit), every = _unit(study, target), _rows_of(study, target)
+    rows = every[:limit]
 
     def reduction(row: Any) -> str:
         error = f" ± {100 * row['error']:.1f} %" if row["error"] else ""
@@ -78,7 +94,9 @@ def design_table(study: DesignStudy, target: Target) -> Table:
     sd_now = significant(float(rows["sd_now"].iloc[0]) / factor)
     whose = ", of the tissue" * (study.specimen == "other")
     title = f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
-    return Table.of((row for _, row in rows.iterrows()), columns, _capitalised(title), text_columns=(0, 3))
+    more = len(every) - len(rows)
+    note = f"{more} more tests under '{EVERY}', and in design.csv." if more else ""
+    return Table.of((row for _, row in rows.iterrows()), columns, _capitalised(title), text_columns=(0, 3), note=note)
 
 
 def design_figure(study: DesignStudy) -> Figure:
@@ -120,6 +138,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
         "The ranking does not know what a laboratory can do: of two tests with nearly the same number choose the one "
         "that is easier to do well.",
     )
+    all_tests = [design_table(study, target) for target in study.targets]
     best = [number for target in study.targets if (number := _best(study, target))]
     return Result(
         command="design",
@@ -132,8 +151,10 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
             "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
             "Expected standard deviation after the best tests", "Expected standard deviation after a test; line: now."
         ),
-        tables=tuple(design_table(study, target) for target in study.targets),
-        sections=(Section("Every test", (tuple(_sentences(study)), figure)), Section("How to read it", (how_to_read,))),
+        tables=tuple(design_table(study, target, TABLE_ROWS) for target in study.targets),
+        sections=(
+            Section(EVERY, (tuple(_sentences(study)), figure, *all_tests)), Section("How to read it", (how_to_read,))
+        ),
         warnings=(*said.warnings, *study.warnings),
         files={"design.csv": rows, "design.json": rows},
         recipe=recipe,

@@ -21,7 +21,7 @@ from tissuq.decks.quantity import Component
 from tissuq.decks.solver import CalculiXSolver
 from tissuq.experiments.units import stress_unit
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
-from tissuq.report.band_table import Bands, percent_of
+from tissuq.report.band_table import OF_RANGES, Bands, percent_of
 from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Picture, Preformatted, Result, Section, Table
 from tissuq.report.source_run import Said, said_by
@@ -260,7 +260,7 @@ def _sections(
     prepared, result = study.prepared, study.result
     sections = [Section(f"{name} over time", _quantity(study, name, of_one)) for name, of_one in bands.items()]
     if (of_first := next(iter(bands.values()))).shares:
-        sentences = (*[SHARES] * result.is_shared, *[of_first.of_sources] * bool(result.sources))
+        sentences = (*[SHARES] * result.is_shared, OF_RANGES, *[of_first.of_sources] * bool(result.sources))
         sentences += (OF_MESH,) * of_first.is_mesh_free
         sections.append(Section("Sources of uncertainty", sentences))
     materials = [

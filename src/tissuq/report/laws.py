@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment.answer import Answer
 from tissuq.assessment.next_step import STEPS
-from tissuq.assessment.uses import MIN_STABLE
+from tissuq.assessment.uses import MIN_STABLE, Verdict
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import columns_of, legend_above, on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import points_along, ways_of
+from tissuq.posterior.laws import ALL_LAWS
 from tissuq.report.inputs import inputs_of
 from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.source_run import LAW_OF_USE
 from tissuq.report.tables import known_number, significant, table_files
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.laws import LawStudy
@@ -69,8 +71,8 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.meaning}.",
-        uses=tuple(use._replace(purpose=f"{use.purpose}, with {law}") for use in answer.uses),
-        next_step=f"continue with {law}, which is as good as any here: {_next_step_with(law, answer)}",
+        uses=tuple(use._replace(purpose=f"{use.purpose}{LAW_OF_USE}{law}") for use in answer.uses),
+        next_step=_next_step(law, answer, is_of_all=settings.laws == (ALL_LAWS,)),
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(law_table(study),),
         sections=_sections(study),
@@ -81,12 +83,20 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     )  # fmt: skip
 
 
-def _next_step_with(law: str, answer: Answer) -> str:
-    """Return what to do next with a law; other laws were tried already."""
-    step = STEPS["design"] if answer.next_step == STEPS["law"] else answer.next_step
-    if "{run}" not in step.shell:
-        return f"{step.shell} Its posterior: tissuq predict {{run}} --material {law} (export and design, too)"
-    return step.shell.replace("{run}", f"{{run}} --material {law}")
+def _next_step(law: str, answer: Answer, *, is_of_all: bool) -> str:
+    """Return what to do next, in agreement with the verdicts on the best law; other laws only where some were left out.
+
+    The law is gone on with where its modulus can be reported, and half of all uses are open to it.
+    """
+    step = STEPS["design"] if is_of_all and answer.next_step == STEPS["law"] else answer.next_step
+    words = step.shell.replace("{run}", f"{{run}} --material {law}")
+    purposes = [use.purpose for use in answer.uses if use.verdict is not Verdict.NO]
+    if answer.uses[0].verdict is Verdict.NO or 2 * len(purposes) < len(answer.uses):
+        but = f"serves only to {' and to '.join(purposes)}" if purposes else "is of no use yet"
+        return f"{law} is as good as any here, but {but}: {words}"
+    if "{run}" not in words:
+        return f"{words} As good as any here is {law}: tissuq predict {{run}} --material {law} (export, design, too)"
+    return f"continue with {law}, which is as good as any here: {words}"
 
 
 def _numbers(study: LawStudy) -> tuple[Number, ...]:

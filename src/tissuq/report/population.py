@@ -37,6 +37,7 @@ from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
+from tissuq.studies.settings import DATA
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,9 +102,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     population, unit, settings = study.population, study.unit, study.settings
     copies, relocated = _copies(study, beside)
     law = relocated["material"]
-    share = share_of_discrepancy(population, study.warnings)
+    share = share_of_discrepancy(population, study.warnings, study.at_rest)
     several = len(study.modes) > 1
-    files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
+    files: dict[str, Any] = {DATA: with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
     tables = {name: _in_units(study, table) for name, table in summaries.items()}
     tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
@@ -117,7 +118,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
     modes = ", ".join(mode.name for mode in study.modes)
     words, predicted = headline(population)[0], [_band(of_mode) for of_mode, _ in bands.values()]
-    uses = uses_of_population(population, predicted, study.warnings, "modulus" if words == MODULUS else words)
+    quantity = "modulus" if words == MODULUS else words
+    uses = uses_of_population(population, predicted, study.warnings, quantity, study.at_rest)
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
@@ -126,7 +128,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         finding=_lead(study) + about_law(population, share) + about_modulus(population, share, words),
         uses=uses,
         next_step=next_step_of(
-            population, study.warnings, share, settings.without, uses, has_aim=needed is not None
+            population, study.warnings, share, settings.without, uses, has_aim=needed is not None,
+            at_rest=study.at_rest,
         ),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),

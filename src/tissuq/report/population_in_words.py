@@ -29,10 +29,12 @@ def next_step_of(
     uses: Sequence[Use] = (),
     *,
     has_aim: bool = False,
+    at_rest: Sequence[str] = (),
 ) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
 
     ``share`` is that of the stress which the discrepancy carries; with an aim, the page has the number that it takes.
+    ``at_rest`` are the specimens with stress at rest, where it is known which.
     """
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
@@ -45,6 +47,12 @@ def next_step_of(
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
     if has_code(warnings, "stress-at-rest"):
+        if 0 < 2 * len(at_rest) < len(population.posteriors):
+            options = " ".join(f"--without {name}" for name in (*already_without, *at_rest))
+            return (
+                f"take off what the load cell shows at rest in {', '.join(at_rest)}, as the warning about it says, and "
+                f"fit again, or leave {'it' if len(at_rest) == 1 else 'them'} out: {options}"
+            )
         return "take off what the load cell shows at rest, as the warning about it says, and fit again"
     if population.complete.model.discrepancy.is_best_fit:
         return "let the data decide how wrong the material is: fit again with --discrepancy auto"
@@ -98,14 +106,14 @@ def about_modulus(population: Population, share: float, words: str) -> str:
     return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
 
 
-def share_of_discrepancy(population: Population, warnings: Sequence[str]) -> float:
-    """Return the share of the stress that the discrepancy carries: the median of the specimens.
+def share_of_discrepancy(population: Population, warnings: Sequence[str], at_rest: Sequence[str] = ()) -> float:
+    """Return the share of the stress that the discrepancy carries: the median of the specimens without stress at rest.
 
-    Zero where there is stress at rest, or where it is not known of most specimens.
+    Zero where it is not known of most specimens, or which of them have stress at rest.
     """
     posteriors = population.posteriors
-    solutions = [fit.solution for fit in posteriors.values() if has_energy(fit.solution.model)]
-    shares = [shares_of_discrepancy(solution)[0] for solution in solutions]
+    fits = [fit for name, fit in posteriors.items() if name not in at_rest and has_energy(fit.solution.model)]
+    shares = [shares_of_discrepancy(fit.solution)[0] for fit in fits]
     known = [share for share, _, high in shares if high < 1]
-    is_clear = 2 * len(known) > len(posteriors) and not has_code(warnings, "stress-at-rest")
-    return float(np.median(known)) if is_clear else 0.0
+    is_known_where = bool(at_rest) or not has_code(warnings, "stress-at-rest")
+    return float(np.median(known)) if 2 * len(known) > len(posteriors) and is_known_where else 0.0

@@ -32,6 +32,7 @@ from tissuq.report.summary import SAME_STATES
 from tissuq.report.tables import table_files
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
+from tissuq.studies.settings import seen_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -88,7 +89,7 @@ def prediction_result(
         The material that was named, where it is a law in the user's file.
     """
     copies = Copies()
-    relocated: dict[str, Any] = {"run": os.path.relpath(beside / settings.run, target), "mode": prediction.mode.name}
+    relocated: dict[str, Any] = {"run": seen_from(target, beside / settings.run), "mode": prediction.mode.name}
     files: dict[str, Any] = {"prediction.csv": prediction.rows, "prediction.nc": prediction.save}
     if settings.data is not None:
         copy = {"file": copies.of_file(beside / settings.data.file), "mode": prediction.mode.name}
@@ -109,7 +110,7 @@ def prediction_result(
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
         finding=_lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction),
         uses=_use_of_mode(prediction, beside / settings.run),
-        next_step=_next_step(prediction, shlex.quote(os.path.normpath(beside / settings.run))),
+        next_step=_next_step(prediction, _named(settings, beside)),
         picture=Picture(
             "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
             f"Predicted bands of the stress in mode {prediction.mode.name}", _caption(prediction),
@@ -130,7 +131,7 @@ def _use_of_mode(prediction: Prediction, run: Path) -> tuple[Use, ...]:
         return ()
     is_measured = prediction.mode in prediction.posterior.model.experiment.modes
     purpose = "predict these tests" if is_measured else "predict other loading modes"
-    return tuple(use for use in uses if use.purpose == purpose)
+    return tuple(use for use in uses if use.purpose.startswith(purpose))
 
 
 def _stresses_at_the_end(prediction: Prediction) -> list[Number]:
@@ -164,7 +165,15 @@ def _shares(prediction: Prediction) -> list[Number]:
     return numbers
 
 
+def _named(settings: PredictionSettings, beside: Path) -> str:
+    """Return the run as it is typed, with the law and the discrepancy where these were chosen."""
+    chosen = (("--material", settings.material), ("--discrepancy", settings.discrepancy))
+    options = [word for option, name in chosen if name is not None for word in (option, name)]
+    return shlex.join([os.path.normpath(beside / settings.run), *options])
+
+
 def _next_step(prediction: Prediction, run: str) -> str:
+    """Return what to do next; ``run`` is the run as it is typed."""
     if prediction.posterior.solution.is_of_data and not prediction.is_calibrated.all():
         return f"see which test would make the extrapolated stress less uncertain: tissuq design {run}"
     if prediction.scores is None:

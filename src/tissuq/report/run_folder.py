@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import unbroken
-from tissuq.studies.settings import INPUT, RECIPE
+from tissuq.studies.settings import DATA, INPUT, RECIPE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -251,7 +251,7 @@ def write_data(folder: Path, experiment: Experiment, unit: StressUnit | None = N
     stress, to_mpa = ("stress", 1.0) if unit is None else (f"stress [{unit.name}]", unit.to_mpa)
     headers = ["test", "mode", "measured"] if len(experiment.curves) > 1 else []
     stated = [name for name in ("direction", "condition") if any(getattr(curve, name) for curve in experiment.curves)]
-    with (folder / "data.csv").open("w", newline="", encoding="utf-8") as file:
+    with (folder / DATA).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         has_errors = bool(experiment.standard_error.any())
         writer.writerow(

@@ -15,7 +15,7 @@ from tissuq.finite_elements.response import respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.solver import CellFields
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.band_table import SHARES, Bands, handy_unit, percent_of
+from tissuq.report.band_table import OF_RANGES, SHARES, Bands, handy_unit, percent_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.simulation_figures import (
     field_figure,
@@ -248,6 +248,7 @@ def _sections(study: SimulationStudy, bands: Bands) -> tuple[Section, ...]:
             *[bands.of_sources] * bool(simulation.ensembles[COMPLETE].sources),
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
+            OF_RANGES,
         )
         sections.append(Section("Sources of uncertainty", (shares, sentences)))
     else:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
 
 __all__ = [
-    "SOURCE", "Said", "check_mesh", "check_source", "copy_mesh", "copy_source", "said_by", "stored_mesh", "uses_of",
+    "LAW_OF_USE", "SOURCE", "Said", "check_mesh", "check_source", "copy_mesh", "copy_source", "said_by", "stored_mesh",
+    "uses_of",
 ]  # fmt: skip
 
 SOURCE = "source"
@@ -33,6 +34,8 @@ SPOILING = ("not-converged", "doubtful-reading", "stress-at-rest", "tests-apart"
             "unmodelled-curve", "measurements")  # fmt: skip
 """Codes of warnings about what a fit says of the tissue, and not about how exactly."""
 SIMULATING, USE_OF_FIT = "simulate with finite elements", "use of the fit in finite elements"
+LAW_OF_USE = ", with "
+"""What stands before the law in a use that a comparison of laws says of one of them."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ def said_by(run: Path, model: StatisticalModel | None = None) -> Said:
 def uses_of(run: Path, model: StatisticalModel) -> list[Use]:
     """Return the uses that a run says of a model: that of its answer, or with this law in a comparison of laws.
 
+    A calibration has one posterior, and its uses are of that.
+
     Raises
     ------
     InputError
@@ -96,8 +101,8 @@ def uses_of(run: Path, model: StatisticalModel) -> list[Use]:
     try:
         is_answer = answering(run) == model.discrepancy.name
     except InputError:  # no run of tissuq fit with one law
-        is_answer = False
-    return [use for use in uses if is_answer or use.purpose.endswith(f", with {model.material.name}")]
+        is_answer = not any(LAW_OF_USE in use.purpose for use in uses)
+    return [use for use in uses if is_answer or use.purpose.endswith(f"{LAW_OF_USE}{model.material.name}")]
 
 
 def check_source(run: Path, folder: Path) -> None:

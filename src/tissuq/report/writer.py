@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 from tissuq.report.result import RESULT, Record, Result, few_and_others
 from tissuq.report.run_folder import RECIPE, write_data, write_figures, write_page, write_recipe
 from tissuq.report.tables import write_csv, write_json
-from tissuq.studies.settings import damage_reported
+from tissuq.studies.settings import DATA, damage_reported
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -134,7 +134,7 @@ def _without_record(folder: Path) -> InputError:
 
 def data_file(experiment: Experiment, unit: StressUnit | None = None) -> dict[str, Any]:
     """Return data.csv with the measurements of an experiment, as a file of a result."""
-    return {"data.csv": lambda path: write_data(path.parent, experiment, unit)}
+    return {DATA: lambda path: write_data(path.parent, experiment, unit)}
 
 
 def posterior_files(posteriors: Mapping[str, Posterior], suffix: str = "") -> dict[str, Callable[[Path], object]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,10 +28,11 @@ from tissuq.experiments.units import PRESSURE, measured_in, stress_unit
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
+from tissuq.result_warning import ResultWarning
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
 from tissuq.studies.earlier_run import load_law, priors_of_run
-from tissuq.studies.settings import INPUT
+from tissuq.studies.settings import DATA, INPUT, damage_reported
 from tissuq.studies.stream import Step, silent
 
 __all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
@@ -77,15 +79,19 @@ class CalibrationStudy:
         material = self.settings.material
         parameters = () if material is None else material_named(material).parameters
         of_material = {parameter.symbol: self.settings.unit for parameter in parameters if parameter.unit}
-        of_noise = {symbol_of(NOISE_SD.symbol, name): measured.units[1] for name, measured in self.data.items()}
-        return of_material | {symbol: unit for symbol, unit in of_noise.items() if unit}
+        of_errors = {
+            symbol_of(parameter.symbol, name): measured.units[0 if parameter.dimension == "stretch" else 1]
+            for name, measured in self.data.items()
+            for parameter in (*self.calibration.problem.discrepancy.parameters, NOISE_SD)
+        }
+        return of_material | {symbol: unit for symbol, unit in of_errors.items() if unit}
 
     def label(self, symbol: str) -> str:
         """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""
         return f"{symbol} [{self.units[symbol]}]" if symbol in self.units else symbol
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[ResultWarning]:
         """Warnings about the calibration."""
         return list(self.calibration.warnings)
 
@@ -171,7 +177,11 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
 def _check_other_measurements(settings: CalibrationSettings, data: Mapping[str, Measured], run: Path) -> None:
     """Refuse the posterior of measurements as the prior beside them, whatever their file is called and in any unit."""
     for name, measured in data.items():
-        fitted = [*_stresses_of(run, str(settings.material)), *_columns_of_inputs(settings, measured, run)]
+        fitted = [
+            *_stresses_of(run, str(settings.material)),
+            *_stresses_of_specimens(run, len(measured.measured), settings.every),
+            *_columns_of_inputs(settings, measured, run),
+        ]
         if any(_are_proportional(values, measured.measured) for values in fitted):
             raise InputError(
                 f"the run '{run}' was fitted to the measurements{f' of {name}' * bool(name)} that are calibrated "
@@ -186,9 +196,34 @@ def _stresses_of(run: Path, material: str) -> Iterator[FloatArray]:
         yield curve.stress
 
 
+def _stresses_of_specimens(run: Path, count: int, stride: int) -> Iterator[FloatArray]:
+    """Yield all successive stresses, so many and at every so many rows, of the specimens of a population.
+
+    Its posterior is of a new specimen, of whom nothing was measured, and its files may have many specimens each.
+    """
+    file = _folder_of(run) / DATA
+    if not file.is_file():
+        return
+    with file.open(newline="", encoding="utf-8") as lines, damage_reported(file):
+        heads, *rows = csv.reader(lines)
+        if heads[0] != "specimen":
+            return
+        stresses: dict[tuple[str, ...], list[float]] = {}
+        for *labels, _, stress in rows:
+            stresses.setdefault(tuple(labels), []).append(float(stress))
+    for values in map(np.array, stresses.values()):
+        for start in range(len(values) - stride * (count - 1)):
+            yield values[start::stride][:count]
+
+
+def _folder_of(run: Path) -> Path:
+    """Return the folder of a run that may be named by the file of its posterior."""
+    return run if run.is_dir() else run.parent.parent
+
+
 def _columns_of_inputs(settings: CalibrationSettings, measured: Measured, run: Path) -> Iterator[FloatArray]:
     """Yield the columns of that name in the run's copies of measured files, of which a fit may have used some rows."""
-    folder = (run if run.is_dir() else run.parent.parent) / INPUT
+    folder = _folder_of(run) / INPUT
     for file in sorted(path for path in folder.glob("*") if path.is_file()):
         with suppress(InputError):
             table = _table(file, settings)

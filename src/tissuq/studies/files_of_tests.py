@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import ReadingSettings
-from tissuq.studies.settings import load_settings
+from tissuq.studies.settings import load_settings, seen_from
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -223,7 +222,7 @@ def study_file(tests: Sequence[Mapping[str, Any]], inspections: Sequence[Inspect
     for test, inspection in zip(tests, inspections, strict=True):
         remarks = [inspection.line, *(f"Note: {text}" for text in inspection.warnings)]
         named = {"name": inspection.reading.experiment.name, **test}
-        named["file"] = Path(os.path.relpath(test["file"], folder)).as_posix()
+        named["file"] = Path(seen_from(folder, test["file"])).as_posix()
         if "mode" not in test:
             named["mode"] = inspection.reading.experiment.mode.name
             remarks.append("Note: the loading mode is a guess: nothing in the file says which it is.")

@@ -18,7 +18,7 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
 from tissuq.population.covariates import covariates_of
-from tissuq.result_warning import merged, most_severe_first
+from tissuq.result_warning import ResultWarning, has_code, merged, most_severe_first
 from tissuq.studies.population_settings import PopulationSettings
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ class PopulationStudy:
     seconds: float
     data_warnings: tuple[str, ...] = ()
     """What is implausible in the measurements."""
+    at_rest: tuple[str, ...] = ()
+    """Specimens with stress at rest."""
 
     @property
     def unit(self) -> StressUnit:
@@ -104,7 +106,9 @@ def run_population(
         method=cast("Method", settings.method),
         seed=settings.seed,
     ).given(settings.new_patient)
-    return PopulationStudy(settings, tests, population, perf_counter() - start, _data_warnings(readings))
+    warnings = _data_warnings(readings)
+    at_rest = tuple(name for name, of_one in warnings.items() if has_code(of_one, "stress-at-rest"))
+    return PopulationStudy(settings, tests, population, perf_counter() - start, _in_few(warnings), at_rest)
 
 
 def _units(tests: Mapping[str, Sequence[Experiment]]) -> set[str]:
@@ -116,10 +120,14 @@ def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
     return stress_unit(units.pop() if len(units) == 1 else "MPa")
 
 
-def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]:
-    """Return the warnings about the files, each once with the specimens that it concerns."""
-    of_specimens = {name: chain.from_iterable(map(data_warnings, of_one)) for name, of_one in readings.items()}
-    messages = most_severe_first(merged(of_specimens, everyone="all specimens"))
+def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> dict[str, list[ResultWarning]]:
+    """Return the warnings about the files of every specimen."""
+    return {name: list(chain.from_iterable(map(data_warnings, of_one))) for name, of_one in readings.items()}
+
+
+def _in_few(warnings: Mapping[str, Sequence[ResultWarning]]) -> tuple[str, ...]:
+    """Return the warnings about the files of specimens, each once with the specimens that it concerns."""
+    messages = most_severe_first(merged(warnings, everyone="all specimens"))
     omitted = len(messages) - MAX_DATA_WARNINGS
     return (
         *messages[:MAX_DATA_WARNINGS],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -19,12 +20,14 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 __all__ = [
-    "DAMAGE", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
-    "looked_up", "positive_or_unknown", "setting_of", "there_is",
+    "DAMAGE", "DATA", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
+    "looked_up", "positive_or_unknown", "seen_from", "setting_of", "there_is",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
+DATA = "data.csv"
+"""The file of a run with its measurements, converted."""
 INPUT = "input"
 """The folder of a run that holds copies of the user's files, so that the run can be repeated."""
 
@@ -118,6 +121,15 @@ def is_inside(file: Path, folder: Path) -> bool:
         return file.resolve().is_relative_to(folder)
     except (OSError, ValueError, RuntimeError):  # such as a NUL or a circle of links
         return False
+
+
+def seen_from(folder: Path, path: str | Path) -> str:
+    """Return a path as a file in a folder names it: relative, and right where a folder on the way is a symbolic link.
+
+    ``..`` leads from the folder that a link names, not from the one in which the link lies.
+    """
+    named = Path(path)
+    return os.path.relpath(named.parent.resolve() / named.name, folder.resolve())
 
 
 def _explanations(error: ValidationError, kind: type[BaseModel], typed: Mapping[str, str]) -> list[str]:
