@@ -87,9 +87,7 @@ def _slopes(material: Material, bent: FloatArray) -> FloatArray:
 
 def _derivatives(material: Material, bent: FloatArray) -> FloatArray:
     """Return initial shear moduli of a material with fibres: of its matrix, as unstretched fibres bear no load."""
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(bent), axis=0)
-    values[:, :, ~is_linear] = bent[:, None]
+    values = material.unit_values(bent)
     return np.array([[initial_shear_modulus(material, parameters) for parameters in unit] for unit in values])
 
 

@@ -148,10 +148,7 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     settings = np.asarray(nonlinear, dtype=np.float64)
     rows = np.atleast_2d(settings)
     _check_nonlinear(material, rows.shape[1:])
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(rows), axis=0)
-    values[:, :, ~is_linear] = rows[:, None]
-    curves = complex_step_stress(material, states, values.reshape(-1, is_linear.size))
+    curves = complex_step_stress(material, states, material.unit_values(rows).reshape(-1, len(material.parameters)))
     if curves is None:
         curves = _scattered(states, lambda path, points: _bases(material, path)(points, rows))
     bases = np.ascontiguousarray(curves.reshape(len(rows), -1, len(states)).swapaxes(1, 2))
@@ -162,7 +159,7 @@ def traced_stress_basis(material: Material, states: States, nonlinear: Any) -> A
     """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
     _check_nonlinear(material, np.shape(nonlinear))
     jnp = differentiator().numpy
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     values = jnp.asarray(np.eye(is_linear.size)[is_linear]).at[:, ~is_linear].set(nonlinear)
     with _explained(material):
         columns = [

@@ -283,7 +283,7 @@ def stress_within(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
 
 def _of_material(material: Material, values: FloatArray, states: States) -> FloatArray:
     """Return the stresses (N, n) of a material with parameters (N, k), a few at a time, as derivatives like them."""
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     if is_linear.all():
         return np.asarray(values @ stress_basis(material, states).T)
     count = max(1, MAX_COMPLEX_STEP_VALUES // (len(states) * int(is_linear.sum())))

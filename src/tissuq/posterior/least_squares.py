@@ -88,7 +88,7 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
     states, stress = data.states.thinned(step), np.concatenate([curve.stress[::step] for curve in data.curves])
     unit = float(np.linalg.norm(stress)) or 1.0  # searches end where gradients are small as numbers
     stress = stress / unit
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     supports = [
         np.divide(priors[parameter.symbol].support, unit) for parameter in material.parameters if parameter.is_linear
     ]
@@ -131,5 +131,5 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
 
 
 def _stress(material: Material, states: States, values: FloatArray) -> FloatArray:
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     return np.asarray(stress_basis(material, states, values[~is_linear]) @ values[is_linear])
