@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.inference.convergence import Draws
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, widened
 from tissuq.model.discrepancy import side_by_side
@@ -43,6 +44,14 @@ class Diagnostics:
     ess_tail: dict[str, float]
     divergences: int | None = None
     least_bfmi: float | None = None
+
+    @classmethod
+    def of(cls, run: Draws) -> Diagnostics:
+        """Return those of draws of a sampler."""
+        rhat, ess_bulk, ess_tail = (
+            dict(zip(run.names, map(float, column), strict=True)) for column in (run.rhat, run.ess_bulk, run.ess_tail)
+        )
+        return cls(run.converged, run.verdict, rhat, ess_bulk, ess_tail)
 
 
 class Marginals(Mapping[str, Marginal]):
