@@ -21,9 +21,8 @@ from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, StretchMaterial
-from tissuq.mechanics.continuation import Continuation, sum_of_energies
+from tissuq.mechanics.draws import Continuation, PiecewiseEnergy, sum_of_energies
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
-from tissuq.mechanics.pieces import PiecewiseEnergy
 from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.pictures.draws import curves
