@@ -79,7 +79,7 @@ class Posterior(PosteriorPlots):
         """The marginal posterior of every parameter: mean, sd, density, quantiles, HDI."""
         return self.solution.marginals
 
-    @property
+    @cached_property
     def initial_shear_modulus(self) -> Marginal:
         """The marginal posterior of the material's initial shear modulus, MPa: what an energy discrepancy leaves alone.
 
