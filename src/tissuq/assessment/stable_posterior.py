@@ -117,7 +117,7 @@ def stable_part(unconstrained: Solution, modes: Sequence[str], seed: int) -> Sol
 def _stable_draws(
     unconstrained: Solution, paths: Sequence[LoadingMode], generator: np.random.Generator
 ) -> tuple[GaussianMixture, int]:
-    """Return at least `FEWEST` stable draws as points, and among how many draws these are."""
+    """Return at least `MIN_STABLE_DRAWS` stable draws as points, and among how many draws these are."""
     source, batches, draw_count, stable_count = unconstrained.wide_mixture, [], 0, 0
     for count in range(1, MAX_ROUNDS + 1):
         component, linear = source.draw(int(generator.integers(2**32)))
