@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.convergence import Draws
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, widened
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
+
+if TYPE_CHECKING:
+    from tissuq.inference.convergence import Draws
 
 __all__ = [
     "PROBABLE_DIRECTION",
