@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.assessment.sheet import sheet_stresses
+from tissuq.assessment.answer import sheet_stresses
 from tissuq.experiments.units import stress_unit
 
 FIBRES, TRUTH = "neo-hookean+exponential-fibres@30", {"C10": 0.002, "k1": 0.004, "k2": 3.0}

@@ -66,7 +66,7 @@ def test_predictions_are_those_of_dense_conditioning(name):
     model = StatisticalModel(DATA, NeoHookean(), discrepancy_named(name), NOISE)
     settings = np.array([[values[symbol] for symbol in model.nonlinear]])
     part = GaussianMixture(np.ones(1), settings, np.array([[values["C10"]]]), np.zeros((1, 1, 1)))
-    mean, variance = stress_moments(model, part, model.experiment.states_at(new), discrepancy=True, noise=False)
+    mean, variance = stress_moments(model, part, model.experiment.states_at(new))
     every = np.concatenate([STRETCH, new])
     K = values["c"] ** 2 * kernel(name, every, values["psi"])
     n = len(STRETCH)

@@ -11,7 +11,7 @@ from dense import columns
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.densities import pointwise_log_likelihood, replicate_data
-from tissuq.prediction.moments import stress_moments
+from tissuq.prediction.moments import stress_moments, variance_of_noise
 
 REPEATED = np.repeat([0.7, 0.9, 1.2, 1.5, 1.9], [2, 1, 3, 2, 2])
 NEW = np.array([0.7, 0.8, 1.2, 1.7, 1.9])
@@ -86,9 +86,9 @@ def components(model):
 @pytest.mark.parametrize("noisy", [True, False])
 def test_moments_at_new_stretches_are_those_of_dense_conditioning(discrepancy, noise, noisy):
     model = model_of(discrepancy, noise)
-    mean, variance = stress_moments(
-        model, components(model), model.experiment.states_at(NEW), discrepancy=True, noise=noisy
-    )
+    states = model.experiment.states_at(NEW)
+    mean, variance = stress_moments(model, components(model), states)
+    variance = variance + noisy * variance_of_noise(model, components(model), states, mean)
     expected, spread = conditioned(discrepancy, noise, NEW)
     sd2, own = white(discrepancy, noise, np.abs(expected))
     np.testing.assert_allclose(mean[0], expected, rtol=1e-9, atol=1e-9)
@@ -98,9 +98,7 @@ def test_moments_at_new_stretches_are_those_of_dense_conditioning(discrepancy, n
 @pytest.mark.parametrize(("discrepancy", "noise"), KINDS)
 def test_the_model_alone_is_the_material(discrepancy, noise):
     model = model_of(discrepancy, noise)
-    mean, variance = stress_moments(
-        model, components(model), model.experiment.states_at(NEW), discrepancy=False, noise=False
-    )
+    mean, variance = stress_moments(model, components(model), model.experiment.states_at(NEW), discrepancy=False)
     np.testing.assert_allclose(mean[0], VALUES["C10"] * columns(["C10"], NEW)[:, 0], rtol=1e-12)
     np.testing.assert_allclose(variance[0], 0.0, atol=1e-15)
 
@@ -138,9 +136,7 @@ def test_replicates_have_the_moments_of_dense_conditioning(discrepancy, noise):
 def test_a_known_repeat_is_predicted_with_its_shared_error_and_a_new_stretch_without():
     # Conditioning on what was measured at the same stretch must narrow the prediction; elsewhere S stays whole.
     model = model_of("constant", "repeats")
-    _, variance = stress_moments(
-        model, components(model), model.experiment.states_at(np.array([1.2, 1.3])), discrepancy=True, noise=False
-    )
+    _, variance = stress_moments(model, components(model), model.experiment.states_at(np.array([1.2, 1.3])))
     assert variance[0, 1] == pytest.approx(0.09, rel=1e-9)
     assert variance[0, 0] == pytest.approx(1 / (1 / 0.09 + 3 / 0.01), rel=1e-9)
 

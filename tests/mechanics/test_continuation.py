@@ -12,7 +12,7 @@ from scipy.stats import t as student_t
 import tissuq as tq
 from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements.material import distortional_energy
-from tissuq.mechanics.continuation import continuations, rays_to_ends, sum_of_energies
+from tissuq.mechanics.draws import continuations, rays_to_ends, sum_of_energies
 from tissuq.mechanics.rays import INNER_SHARE, MAX_EXPONENT, MIN_EXPONENT, TRANSITION, Range, share_to_end, with_errors
 
 TRUTH = {"C10": 0.5, "C20": 0.1, "C30": 0.05}

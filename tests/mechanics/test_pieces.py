@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from tissuq.mechanics.pieces import PiecewiseEnergy, pieces
+from tissuq.mechanics.draws import PiecewiseEnergy, pieces
 from tissuq.mechanics.stress import differentiator
 
 KNOTS = np.linspace(-0.7, 1.3, 201)

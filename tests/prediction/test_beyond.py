@@ -279,7 +279,7 @@ def test_a_discrepancy_that_is_no_random_energy_goes_on_by_its_own_moments(discr
     posterior = fitted("yeoh", TRUTH, STRETCH, 3, discrepancy=discrepancy)
     mixture, points = posterior.solution.mixture, np.array([0.5, 0.9, 1.5, 2.5])
     states = posterior.model.experiment.states_at(points, loading_mode("uniaxial"), 0)
-    moments = stress_moments(posterior.model, mixture, states, discrepancy=True, noise=False)
+    moments = stress_moments(posterior.model, mixture, states)
     band, whole = posterior.predict(points, noise=False), Mixtures(mixture.weights, *moments)
     width = 2 * half_width(band)
     for end, probability in ENDS.items():  # the band's mixture is thinned

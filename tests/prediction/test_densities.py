@@ -10,7 +10,7 @@ import gallery
 import tissuq as tq
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.prediction.densities import joint_log_likelihood, leave_one_out, left_out_log_density
-from tissuq.prediction.moments import stress_moments
+from tissuq.prediction.moments import stress_moments, variance_of_noise
 
 STRETCH = np.linspace(0.7, 1.9, 14)
 DATA = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, STRETCH, noise_sd=0.05, seed=1)
@@ -28,9 +28,9 @@ def refitted(name, noise_sd, priors, out):
     data = tq.Experiment("uniaxial", STRETCH[rest], DATA.stress[rest])
     solution = tq.fit(data, discrepancy=name, noise_sd=noise_sd, priors=priors, tolerances="as-tested").solution
     parts = solution.mixture
-    mean, variance = stress_moments(
-        solution.model, parts, solution.model.experiment.states_at(STRETCH[[out]]), discrepancy=True, noise=True
-    )
+    states = solution.model.experiment.states_at(STRETCH[[out]])
+    mean, variance = stress_moments(solution.model, parts, states)
+    variance = variance + variance_of_noise(solution.model, parts, states, mean)
     return np.log(parts.weights @ norm.pdf(DATA.stress[out], mean[:, 0], np.sqrt(variance[:, 0])))
 
 

@@ -41,7 +41,7 @@ def test_means_and_variances_are_those_of_single_predictions(tests, options, eve
     model, parts = solution.model, solution.mixture.thinned(50)
     states = states_of(model, every)
     mean, root = joint_stresses(model, parts, states)
-    wanted, variance = stress_moments(model, parts, states, discrepancy=True, noise=False)
+    wanted, variance = stress_moments(model, parts, states)
     values = {symbol: own[:, None] for symbol, own in zip(model.nonlinear, parts.settings.T, strict=True)}
     np.testing.assert_allclose(mean, wanted, rtol=1e-5, atol=1e-6)
     own = (root**2).sum(axis=2) + model.discrepancy.independent_variance(values)

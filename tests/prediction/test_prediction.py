@@ -10,7 +10,7 @@ import gallery
 import tissuq as tq
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.prediction.densities import pointwise_log_likelihood
-from tissuq.prediction.moments import borne, drawn_curves, stress_moments
+from tissuq.prediction.moments import borne, drawn_curves, stress_moments, variance_of_noise
 
 TRUTH = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
 STRETCH = np.linspace(0.6, 2.2, 14)
@@ -47,7 +47,9 @@ def test_a_conditioned_process_agrees_with_dense_linear_algebra(noise):
     precision = x(STRETCH) @ np.linalg.solve(V, x(STRETCH)) + 0.7**-2
     b = (x(STRETCH) @ np.linalg.solve(V, DATA.stress) + 0.7**-2) / precision
     components = GaussianMixture(np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]]))
-    mean, variance = stress_moments(model, components, model.experiment.states_at(NEW), discrepancy=True, noise=noise)
+    states = model.experiment.states_at(NEW)
+    mean, variance = stress_moments(model, components, states)
+    variance = variance + noise * variance_of_noise(model, components, states, mean)
 
     joint = kernel(STRETCH, STRETCH, c, psi) + 0.49 * np.outer(x(STRETCH), x(STRETCH)) + 0.04 * np.eye(14)
     cross = kernel(NEW, STRETCH, c, psi) + 0.49 * np.outer(x(NEW), x(STRETCH))

@@ -13,18 +13,23 @@ from tissuq.assessment.extent import has_energy
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.next_step import Step, next_step
 from tissuq.assessment.shares import shares_of_discrepancy
-from tissuq.assessment.sheet import SheetStresses, sheet_stresses
-from tissuq.assessment.stability import StableRange
+from tissuq.assessment.stability import StableRange, measured_states
 from tissuq.assessment.uses import PRECISE, Use, uses_of
-from tissuq.experiments.units import stress_unit
+from tissuq.errors import TissuqError
+from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
+from tissuq.mechanics.invariants import farthest_stretch
+from tissuq.prediction.bands import predict_band
 from tissuq.result_warning import ResultWarning, has_code
 
-__all__ = ["NOTABLE_SHARE", "Answer", "Estimate", "answer_of"]
+__all__ = ["NOTABLE_SHARE", "Answer", "Estimate", "SheetStresses", "answer_of", "sheet_stresses"]
 
 NOTABLE_SHARE = 0.05
 """Of the stress, from which the discrepancy is worth a word."""
+MIN_SHEET_STRAIN = 0.01
+"""Strain of both axes that must have been reached, so that stresses differ from noise."""
 TOGETHER = "Use it with the discrepancy, as exported cards do."
 
 
@@ -35,6 +40,21 @@ class Estimate(NamedTuple):
     mean: float
     low: float
     high: float
+
+
+class SheetStresses(NamedTuple):
+    """Stresses along the axes of a sheet at equal stretches: name, median and ends of the 95 % interval, MPa."""
+
+    stretch: float
+    stresses: tuple[tuple[str, float, float, float], ...]
+
+    def in_words(self, unit: StressUnit) -> str:
+        """Return a sentence in a unit."""
+        texts = []
+        for name, *values in self.stresses:
+            median, low, high = (value / unit.to_mpa for value in values)
+            texts.append(f"{name} {median:.3g} {unit.name} ({low:.3g} to {high:.3g})")
+        return f"Where both axes are stretched to {self.stretch:.3f}: {', '.join(texts)}."
 
 
 @dataclass(frozen=True)
@@ -138,6 +158,34 @@ def _law_in_words(solution: Solution, has_stress_at_rest: bool) -> str:
             f"interval {100 * low:.0f} % to {100 * high:.0f} %). {TOGETHER}"
         )
     return f"How much of the stress is {law}'s and how much the discrepancy's is not determined. {TOGETHER}"
+
+
+def sheet_stresses(solution: Solution) -> SheetStresses | None:
+    """Return the stresses at the largest equal stretches up to which states were measured.
+
+    None where the tissue has no preferred direction, no test measured two stresses at two stretches, or both stretches
+    were never reached together.
+    """
+    model = solution.model
+    is_sheet = solution.is_directed or not model.material.is_isotropic
+    if not is_sheet or not (mode := next(filter(_has_two_axes, model.experiment.modes), None)):
+        return None
+    states = measured_states(model, is_directed=True)
+    stretch = farthest_stretch(loading_mode("equibiaxial"), states, 1)
+    if stretch < 1 + MIN_SHEET_STRAIN:
+        return None
+    stresses = []
+    for channel, name in enumerate(mode.stresses):
+        try:
+            band = predict_band(solution, [[stretch, stretch]], noise=False, mode=mode, channel=channel)
+        except TissuqError:
+            return None
+        stresses.append((name, float(band.median[0]), float(band.low[0]), float(band.high[0])))
+    return SheetStresses(stretch, tuple(stresses))
+
+
+def _has_two_axes(mode: LoadingMode) -> bool:
+    return len(mode.controls) == len(mode.stresses) == 2
 
 
 def _estimate(name: str, marginal: Marginal) -> Estimate:

@@ -29,6 +29,7 @@ from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import FittedErrors
+from tissuq.prediction.moments import values_of
 
 __all__ = ["Assessment", "assess", "has_energy"]
 
@@ -326,8 +327,7 @@ def _between(solution: Solution, marginal: Marginal) -> float:
     if mixture.member is None:
         return 0.0
     model = solution.model
-    columns = dict(zip((*model.nonlinear, *model.linear), np.hstack([mixture.settings, mixture.mean]).T, strict=False))
-    values = columns[model.headline]
+    values = values_of(model, mixture, [model.headline])[0][:, 0]
     names = np.array([member.name for member in model.energy_members])[mixture.member]
     explained = 0.0
     for name in np.unique(names):

@@ -13,7 +13,7 @@ from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, ma
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import Material, initial_shear_modulus, stress_basis
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import coefficients
+from tissuq.prediction.moments import coefficients, values_of
 
 __all__ = ["modulus", "modulus_moments", "modulus_symbols"]
 
@@ -32,7 +32,7 @@ def modulus(solution: Solution) -> Marginal:
     """
     model, mixture = solution.model, solution.mixture
     symbols = modulus_symbols(model)
-    moduli = _moduli(model, _bent(model, mixture))
+    moduli = _moduli(model, values_of(model, mixture, model.bent_symbols)[0])
     if len(symbols) == 1 and not np.ptp(moduli, axis=0).any():
         factor = float(moduli[0, model.column_symbols.index(symbols[0])])
         return _scaled(solution.marginals[symbols[0]], factor)
@@ -53,7 +53,8 @@ def modulus(solution: Solution) -> Marginal:
 
 def modulus_moments(model: StatisticalModel, mixture: GaussianMixture) -> tuple[FloatArray, FloatArray]:
     """Return means (M,) and roots (M, p) of the initial shear modulus in every component, MPa."""
-    moduli, (mean, root) = _moduli(model, _bent(model, mixture)), coefficients(model, mixture)
+    moduli = _moduli(model, values_of(model, mixture, model.bent_symbols)[0])
+    mean, root = coefficients(model, mixture)
     return (moduli * mean).sum(axis=1), np.einsum("mk,mkp->mp", moduli, root)
 
 
@@ -61,11 +62,6 @@ def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:
     """Return the parameters on which the initial shear modulus depends."""
     moduli = np.abs(_moduli(model, np.array([model.usual_bent])))[0]
     return tuple(s for s, size in zip(model.column_symbols, moduli, strict=True) if size > 1e-6 * moduli.max())
-
-
-def _bent(model: StatisticalModel, mixture: GaussianMixture) -> FloatArray:
-    """Return the parameters (M, s) in which the material's stress is not linear."""
-    return mixture.settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]]
 
 
 def _moduli(model: StatisticalModel, bent: FloatArray) -> FloatArray:
@@ -87,9 +83,7 @@ def _slopes(material: Material, bent: FloatArray) -> FloatArray:
 
 def _derivatives(material: Material, bent: FloatArray) -> FloatArray:
     """Return initial shear moduli of a material with fibres: of its matrix, as unstretched fibres bear no load."""
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(bent), axis=0)
-    values[:, :, ~is_linear] = bent[:, None]
+    values = material.unit_values(bent)
     return np.array([[initial_shear_modulus(material, parameters) for parameters in unit] for unit in values])
 
 

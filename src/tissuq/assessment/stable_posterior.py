@@ -16,6 +16,7 @@ from tissuq.inference.gaussian_mixture import CHAINS, GaussianMixture
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.prediction.moments import values_of
 
 __all__ = ["ALL_MODES", "modes_named", "stable_part"]
 
@@ -79,11 +80,8 @@ def stable_part(unconstrained: Solution, modes: Sequence[str], seed: int) -> Sol
     reason = f"{unconstrained.reason}; of {draw_count} draws the {stable_count} that are stable in {names} loading"
 
     def marginal(symbol: str) -> Marginal:
-        if symbol in model.linear:
-            values = mixture.mean[:, model.linear.index(symbol)]
-        else:
-            values = mixture.settings[:, model.nonlinear.index(symbol)]
-        return marginal_of_points(values, mixture.weights, model.priors[symbol].support)
+        values, _ = values_of(model, mixture, [symbol])
+        return marginal_of_points(values[:, 0], mixture.weights, model.priors[symbol].support)
 
     solution = Solution(
         model,
@@ -119,13 +117,13 @@ def stable_part(unconstrained: Solution, modes: Sequence[str], seed: int) -> Sol
 def _stable_draws(
     unconstrained: Solution, paths: Sequence[LoadingMode], generator: np.random.Generator
 ) -> tuple[GaussianMixture, int]:
-    """Return at least `FEWEST` stable draws as points, and among how many draws these are."""
+    """Return at least `MIN_STABLE_DRAWS` stable draws as points, and among how many draws these are."""
     source, batches, draw_count, stable_count = unconstrained.wide_mixture, [], 0, 0
     for count in range(1, MAX_ROUNDS + 1):
         component, linear = source.draw(int(generator.integers(2**32)))
-        points = _as_points(source.settings[component.ravel()], linear.reshape(component.size, -1))
-        if source.member is not None:
-            points = replace(points, member=source.member[component.ravel()])
+        rows = component.ravel()
+        member = None if source.member is None else source.member[rows]
+        points = _as_points(source.settings[rows], linear.reshape(len(rows), -1), member)
         stable = are_stable(unconstrained.model, points, paths)
         batches.append(points[stable])
         draw_count, stable_count = draw_count + component.size, stable_count + int(stable.sum())
@@ -142,9 +140,9 @@ def _stable_draws(
     return draws.weighted(np.full(stable_count, 1 / stable_count)), draw_count
 
 
-def _as_points(settings: FloatArray, linear: FloatArray) -> GaussianMixture:
+def _as_points(settings: FloatArray, linear: FloatArray, member: NDArray[np.intp] | None = None) -> GaussianMixture:
     """Return draws (M, d) and (M, p) as components without width."""
-    return GaussianMixture.of_points(np.full(len(linear), 1 / len(linear)), settings, linear)
+    return GaussianMixture.of_points(np.full(len(linear), 1 / len(linear)), settings, linear, member)
 
 
 def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Generator) -> GaussianMixture:
@@ -165,4 +163,4 @@ def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Gener
         for block, size in zip(model.energy_members[index].amplitude_indices, sizes[index], strict=True):
             weights[rows, start : start + size] *= values[model.energy_symbols[block]][rows, None]
             start += size
-    return replace(_as_points(settings, np.hstack([linear, weights])), member=member)
+    return _as_points(settings, np.hstack([linear, weights]), member)

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.energy_derivatives import FibreEnergy, Fibres, gradient, gradient_and_hessian, is_arithmetic
 from tissuq.mechanics import FibreMaterial, Material
-from tissuq.mechanics.continuation import Continuation, sum_of_energies
+from tissuq.mechanics.draws import Continuation, PiecewiseEnergy, sum_of_energies
 from tissuq.mechanics.material import MaterialSum
-from tissuq.mechanics.pieces import PiecewiseEnergy
 from tissuq.mechanics.stress import differentiator
 from tissuq.posterior.ensemble import EnergyDraw
 

@@ -204,7 +204,7 @@ def condition(
     log_determinant : (...) array
         log |V|.
     fit : Fit
-    others : (..., q - p) array
+    multipliers : (..., q - p) array
         Minus the values of those other parameters, and one: the data are [F, e] times this.
     prior : (mean, precision, log constant) of (..., p), (..., p) and (...) arrays
         Of the linear parameters; precision zero for flat and uniform ones.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-__all__ = ["highest"]
+__all__ = ["highest", "top_of_parabola"]
 
 MAX_EVALUATIONS = 20
 
@@ -47,7 +47,7 @@ def highest(
         else:
             neighbours = points[index - 1 : index + 2]
             farther = max((neighbours[0], neighbours[2]), key=lambda neighbour: abs(neighbour - best))
-            point, value = _top(neighbours, [values[neighbour] for neighbour in neighbours])
+            point, value = top_of_parabola(neighbours, [values[neighbour] for neighbour in neighbours])
             if abs(farther - best) > widest:  # a parabola says little
                 point = 0.5 * (farther + best)
             elif value < values[best] + accuracy:
@@ -57,7 +57,7 @@ def highest(
     return best, values[best]
 
 
-def _top(points: list[float], values: list[float]) -> tuple[float, float]:
+def top_of_parabola(points: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
     """Return the top of the parabola through three ascending places, of which the middle one has the largest value."""
     distance_before, distance_after = points[0] - points[1], points[2] - points[1]
     drop_before, drop_after = values[0] - values[1], values[2] - values[1]

@@ -228,7 +228,7 @@ def _search(
 
 
 def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:
-    """Return normalised weights to the largest power at most one that leaves ``least`` effective, and that power."""
+    """Return normalised weights to the largest power at most one that leaves enough effective, and that power."""
     low, high = 0.0, 1.0
     if effective(log_weights) >= min_effective:
         low = 1.0

@@ -216,6 +216,8 @@ class Reducer:
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
         if is_plain and (len(self._models) == 1 or n > CHUNK):
             return [_from_statistics(self._models)]
+        if is_plain:
+            return _of_independent_errors(self._models, model.design[None])
         together = len(settings) if n <= FEW_POINTS else 1
         blocks = (settings[start : start + together] for start in range(0, len(settings), max(1, together)))
         return [reduction for block in blocks for reduction in _reduced(model, self._fit, block)]
@@ -312,9 +314,6 @@ def _reduced(model: StatisticalModel, fit: _Fit, shapes: Sequence[tuple[float, .
     n = model.experiment.size
     if model.is_correlated:
         return _along_spectra(fit, [correlation_spectrum(model, shape) for shape in shapes])
-    if not model.noise.depends_on_level:
-        squares = _products(fit.shared, fit.residual).sum(axis=1, keepdims=True)
-        return [fit.reduction(squares, np.array([float(n)]), np.zeros(1))]
     levels, level_index, count = np.unique(model.levels, return_inverse=True, return_counts=True)
     by_level = np.zeros((len(levels), len(fit.residual), (fit.shared.shape[1] + 1) ** 2))
     for start in range(0, n, CHUNK):

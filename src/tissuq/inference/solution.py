@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, widened
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
+
+if TYPE_CHECKING:
+    from tissuq.inference.convergence import Draws
 
 __all__ = [
     "PROBABLE_DIRECTION",
@@ -43,6 +46,14 @@ class Diagnostics:
     ess_tail: dict[str, float]
     divergences: int | None = None
     least_bfmi: float | None = None
+
+    @classmethod
+    def of(cls, run: Draws) -> Diagnostics:
+        """Return those of draws of a sampler."""
+        rhat, ess_bulk, ess_tail = (
+            dict(zip(run.names, map(float, column), strict=True)) for column in (run.rhat, run.ess_bulk, run.ess_tail)
+        )
+        return cls(run.converged, run.verdict, rhat, ess_bulk, ess_tail)
 
 
 class Marginals(Mapping[str, Marginal]):

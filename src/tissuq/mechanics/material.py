@@ -9,6 +9,7 @@ from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import Deformation
@@ -48,6 +49,18 @@ class Material(ABC):
 
     def __add__(self, material: Material) -> Material:
         return MaterialSum.of(self, material)
+
+    @property
+    def linear_mask(self) -> NDArray[np.bool_]:
+        """To which of its parameters (k,) the stress is proportional."""
+        return np.array([parameter.is_linear for parameter in self.parameters], dtype=bool)
+
+    def unit_values(self, nonlinear: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values (m, p, k) in which each of p linear parameters is one by itself, at m others' values (m, s)."""
+        is_linear = self.linear_mask
+        values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(nonlinear), axis=0)
+        values[:, :, ~is_linear] = nonlinear[:, None]
+        return values
 
     @abstractmethod
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:

@@ -23,6 +23,7 @@ __all__ = [
     "path_energy",
     "stress_basis",
     "stresses_at",
+    "stresses_by_basis",
     "traced_stress_basis",
 ]
 
@@ -148,21 +149,33 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     settings = np.asarray(nonlinear, dtype=np.float64)
     rows = np.atleast_2d(settings)
     _check_nonlinear(material, rows.shape[1:])
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(rows), axis=0)
-    values[:, :, ~is_linear] = rows[:, None]
-    curves = complex_step_stress(material, states, values.reshape(-1, is_linear.size))
+    curves = complex_step_stress(material, states, material.unit_values(rows).reshape(-1, len(material.parameters)))
     if curves is None:
         curves = _scattered(states, lambda path, points: _bases(material, path)(points, rows))
     bases = np.ascontiguousarray(curves.reshape(len(rows), -1, len(states)).swapaxes(1, 2))
     return bases if settings.ndim == 2 else np.asarray(bases[0])
 
 
+def stresses_by_basis(material: Material, states: States, values: FloatArray) -> FloatArray:
+    """Return the stresses (m, n) at states (n,) for parameter values (m, k), not finite where there are none.
+
+    As sums over `stress_basis`, of a few values at a time, as derivatives like them.
+    """
+    is_linear = material.linear_mask
+    if is_linear.all():
+        return np.asarray(values @ stress_basis(material, states).T)
+    count = max(1, MAX_COMPLEX_STEP_VALUES // (len(states) * int(is_linear.sum())))
+    blocks = [values[start : start + count] for start in range(0, len(values), count)]
+    bases = (stress_basis(material, states, block[:, ~is_linear]) for block in blocks)
+    pairs = zip(bases, blocks, strict=True)
+    return np.concatenate([np.einsum("nsk,nk->ns", basis, block[:, is_linear]) for basis, block in pairs])
+
+
 def traced_stress_basis(material: Material, states: States, nonlinear: Any) -> Any:
     """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
     _check_nonlinear(material, np.shape(nonlinear))
     jnp = differentiator().numpy
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     values = jnp.asarray(np.eye(is_linear.size)[is_linear]).at[:, ~is_linear].set(nonlinear)
     with _explained(material):
         columns = [

@@ -297,7 +297,7 @@ def checked(material: Material) -> list[Check]:
     if not material.needs_matrix:
         problem = "" if modulus > 0 else f"it is {modulus:.3g} MPa"
         checks.append(Check("the initial shear modulus is positive", problem))
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     if is_linear.any():
         factors = np.where(is_linear, [2.0, *3.0 + np.arange(1, len(values))], 1.0)
         scaled = engineering_stress(material, path, points, factors * values)

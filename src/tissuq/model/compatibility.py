@@ -113,7 +113,7 @@ def check_linearity(material: Material, ends: States, bent: tuple[float, ...]) -
     """Refuse a material whose stress, between two states of a path, is not proportional to its linear parameters."""
     low, high = ends.points[0]
     states = ends.paths[0].at(np.linspace(low, high, 16))
-    is_linear = np.array([p.is_linear for p in material.parameters])
+    is_linear = material.linear_mask
     tried = np.empty((is_linear.sum() + 1, len(is_linear)))
     tried[:, ~is_linear] = bent
     tried[:, is_linear] = 0.3 + np.random.default_rng(0).random((len(tried), is_linear.sum()))

@@ -20,7 +20,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import Tolerances, specimens_of
 from tissuq.next_test.candidates import Candidate, Stresses, Target, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
-from tissuq.prediction.moments import stress_moments, stress_slopes
+from tissuq.prediction.moments import stress_moments, stress_slopes, values_by_symbol
 
 __all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]
 
@@ -236,7 +236,7 @@ class NextTest:
         if not self.tolerances.need_slope:
             return ErrorPoints(candidate.mode, points, curve)
         states = states_of(self.model, [(candidate.mode, points)])
-        mean, _ = stress_moments(self.model, components, states, discrepancy=True, noise=False)
+        mean, _ = stress_moments(self.model, components, states)
         slopes = stress_slopes(self.model, components, states, mean)
         weights = components.weights / components.weights.sum()
         return ErrorPoints(candidate.mode, points, curve, np.einsum("m,mgc->gc", weights, slopes))
@@ -250,9 +250,7 @@ class NextTest:
         larger independent ones.
         """
         model = self.model
-        values = {
-            symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)
-        }
+        values = values_by_symbol(model, components.settings)
         states = states_of(model, [(candidate.mode, points)])
         variance = model.noise_variance(values, np.abs(curve)) * model.relative_noise(states) ** 2
         variance = variance * widening_of_lag(model.fitted_errors.lag or 0.0) ** 2

@@ -1,4 +1,4 @@
-"""The draws of a population, what they are made from, their median and interval, and all as labelled arrays."""
+"""The draws of a population, what they are made from, effects of covariates, and all as labelled arrays."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.population.covariates import Covariates, covariates_of
 from tissuq.population.likelihoods import Coordinates
@@ -17,14 +18,18 @@ from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.posterior.posterior import Posterior
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["INTERVAL_COLUMNS", "PopulationDraws", "interval", "labelled_arrays"]
+__all__ = ["ALL_COVARIATES", "INTERVAL_COLUMNS", "PopulationDraws", "effect_table", "interval", "labelled_arrays"]
 
 FloatArray = NDArray[np.float64]
 
 INTERVAL_COLUMNS = ["median", "hdi_low", "hdi_high"]
 """What `interval` returns, as tables of a population have it."""
+ALL_COVARIATES = "all covariates"
+"""In place of a covariate, of the share that they explain together."""
 
 
 class PopulationDraws:
@@ -101,6 +106,15 @@ class PopulationDraws:
         columns = self.covariates.row(self.patient_covariates)
         return self.coordinates.from_line(self.hierarchy.new(np.random.default_rng([self.seed, 5]), columns))
 
+    @property
+    def explained_share(self) -> FloatArray:
+        """Draws (chains, draws, d) of the share of the variance between specimens that covariates explain.
+
+        It is that of B x_i over the specimens, over its sum with tau squared (Gelman & Pardoe 2006).
+        """
+        explained = np.einsum("ik,cdkj->cdij", self.covariates.design, self.hierarchy.effects).var(axis=2)
+        return np.asarray(explained / (explained + self.hierarchy.tau**2))
+
     def unit(self, name: str | None = None) -> StressUnit:
         """Return the unit of stress of that name, or that of the measurements; MPa where theirs differ."""
         units = {posterior.unit().name for posterior in self.posteriors.values()}
@@ -118,6 +132,27 @@ def interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:
     count = round(prob * len(values))
     start = int((values[count:] - values[: len(values) - count]).argmin())
     return float(np.median(values)), float(values[start]), float(values[start + count])
+
+
+def effect_table(population: PopulationDraws, prob: float, unit: StressUnit) -> pd.DataFrame:
+    """Return `Population.effects`, differences of stresses in a unit."""
+    import pandas as pd
+
+    covariates, coordinates = population.covariates, population.coordinates
+    slopes = population.hierarchy.effects / covariates.sizes[:, None]
+    rows: dict[tuple[str, str], list[Any]] = {}
+    for j, (symbol, is_log) in enumerate(zip(population.symbols, coordinates.is_log, strict=True)):
+        scale = coordinates.scale[j] / population.unit_of(symbol, unit).to_mpa
+        for k, (name, per) in enumerate(covariates.effects):
+            draws = np.exp(slopes[..., k, j]) if is_log else slopes[..., k, j] * scale
+            positive = float((slopes[..., k, j] > 0).mean())
+            rows[symbol, name] = ["factor" if is_log else "difference", per, *interval(draws, prob), positive]
+        if covariates:
+            share = interval(population.explained_share[..., j], prob)
+            rows[symbol, ALL_COVARIATES] = ["share", "of the variance", *share, np.nan]
+    index = pd.MultiIndex.from_tuples(rows, names=["parameter", "covariate"]) if rows else None
+    table = pd.DataFrame(list(rows.values()), index, ["kind", "per", *INTERVAL_COLUMNS, "positive"])
+    return headed(table, unit)
 
 
 def labelled_arrays(population: PopulationDraws, labels: Mapping[str, str | float]) -> dict[str, LabelledGroup]:

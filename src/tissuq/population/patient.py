@@ -208,12 +208,8 @@ def patient_curves(
 
 def _diagnostics(hierarchy: Hierarchy, values: FloatArray, symbols: tuple[str, ...]) -> Diagnostics:
     """Return how well draws (chains, draws, k) of the parameters are known; converged where the population has."""
-    population, patient = hierarchy.diagnostics, hierarchy.sampled.of(values, symbols)
-    rhat, ess_bulk, ess_tail = (
-        dict(zip(symbols, map(float, column), strict=True))
-        for column in (patient.rhat, patient.ess_bulk, patient.ess_tail)
-    )
-    return Diagnostics(bool(population.converged), population.verdict, rhat, ess_bulk, ess_tail)
+    population, patient = hierarchy.diagnostics, Diagnostics.of(hierarchy.sampled.of(values, symbols))
+    return replace(patient, converged=population.converged, verdict=population.verdict)
 
 
 def _initial_modulus(material: Material, values: FloatArray) -> FloatArray:

@@ -29,9 +29,9 @@ from tissuq.posterior.solver import Method
 __all__ = ["MIN_SPECIMENS", "fit_population"]
 
 MIN_SPECIMENS = 3
+"""Smallest number of specimens: two determine a difference, but no spread."""
 LEAST_DEFORMATION = 0.01
 """Of a specimen, over that of the others, below which it was hardly deformed."""
-"""Smallest number of specimens: two determine a difference, but no spread."""
 ALL_SPECIMENS = "all specimens"
 """Name of all specimens together, as complete pooling treats them."""
 

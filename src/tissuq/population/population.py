@@ -16,8 +16,7 @@ from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.parameters.checks import check_probability
-from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, interval, labelled_arrays
-from tissuq.population.effects import effect_table
+from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, effect_table, interval, labelled_arrays
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.population.sample_size import needed_table

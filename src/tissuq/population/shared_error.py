@@ -28,7 +28,7 @@ from tissuq.population.draws import PopulationDraws, interval
 from tissuq.population.likelihoods import Coordinates, on_line
 from tissuq.population.sample_size import relative_width, score
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.moments import values_of
+from tissuq.prediction.moments import values_by_symbol, values_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -108,7 +108,7 @@ def _given_discrepancy(model: StatisticalModel, mixture: GaussianMixture, symbol
     components = mixture.thinned(BENT_COMPONENTS if model.bent_symbols else COMPONENTS)
     parameters = [model.material_symbols.index(symbol) for symbol in symbols]
     prior_precision = np.diag([_precision(model.priors[symbol]) for symbol in model.material_symbols])
-    settings = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
+    settings = values_by_symbol(model, components.settings)
     levels = model.levels if model.noise.depends_on_level else np.zeros(1)
     variance = np.broadcast_to(model.noise_variance(settings, levels), (len(components), len(levels)))
     values, _ = values_of(model, components, model.material_symbols)

@@ -15,9 +15,8 @@ from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import Solution, are_isotropic
-from tissuq.mechanics.continuation import continuations, rays_to_ends
+from tissuq.mechanics.draws import PiecewiseEnergy, continuations, pieces, rays_to_ends
 from tissuq.mechanics.invariants import largest_invariants
-from tissuq.mechanics.pieces import PiecewiseEnergy, pieces
 from tissuq.mechanics.rays import MAX_CORNER_EXCESS, Range, scores, through, with_errors
 from tissuq.model.discrepancy.blocks import Coordinates
 from tissuq.model.statistical_model import StatisticalModel

@@ -20,11 +20,10 @@ from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode
 from tissuq.experiments.units import stress_unit
-from tissuq.mechanics import Material, StretchMaterial, stress_basis
-from tissuq.mechanics.continuation import Continuation, sum_of_energies
+from tissuq.mechanics import Material, StretchMaterial
+from tissuq.mechanics.draws import Continuation, PiecewiseEnergy, sum_of_energies
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
-from tissuq.mechanics.pieces import PiecewiseEnergy
-from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
+from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.pictures.prediction import curves
 
@@ -271,7 +270,7 @@ def stress_within(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
     """Return the stresses (N, n) of draws at states (n,) in the range of their data."""
     stresses = np.zeros((len(draws), len(states)))
     for term, (material, _) in enumerate(draws[0].parts):
-        stresses += _of_material(material, np.array([draw.parts[term][1] for draw in draws]), states)
+        stresses += stresses_by_basis(material, states, np.array([draw.parts[term][1] for draw in draws]))
     rates, (logs, log_rates) = invariant_rates(states), states.log_stretches
     I1, I2 = invariants(states)
     for row, energy in zip(stresses, (draw.discrepancy for draw in draws), strict=True):
@@ -279,15 +278,3 @@ def stress_within(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
             row += energy.of_i1.slope(I1) * rates[0] + energy.of_i2.slope(I2) * rates[1]
             row += (energy.logarithm.slope(logs) * log_rates).sum(axis=1)
     return stresses
-
-
-def _of_material(material: Material, values: FloatArray, states: States) -> FloatArray:
-    """Return the stresses (N, n) of a material with parameters (N, k), a few at a time, as derivatives like them."""
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    if is_linear.all():
-        return np.asarray(values @ stress_basis(material, states).T)
-    count = max(1, MAX_COMPLEX_STEP_VALUES // (len(states) * int(is_linear.sum())))
-    blocks = [values[start : start + count] for start in range(0, len(values), count)]
-    bases = (stress_basis(material, states, block[:, ~is_linear]) for block in blocks)
-    pairs = zip(bases, blocks, strict=True)
-    return np.concatenate([np.einsum("nsk,nk->ns", basis, block[:, is_linear]) for basis, block in pairs])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,11 +82,8 @@ def labelled_arrays(
     return groups
 
 
-def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> dict[str, str | float]:
-    """Return what was fitted, how, and what came out, in short: the attributes of the arrays.
-
-    ``headline`` is the row of the headline parameter in the summary.
-    """
+def labels_of(solution: Solution, seed: int) -> dict[str, str | float]:
+    """Return what was fitted, how, and what came out, in short: the attributes of the arrays."""
     model = solution.model
     labels: dict[str, str | float] = {
         "inference_library": "tissuq",
@@ -100,10 +97,10 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> d
         "seed": seed,
     }
     labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
-    labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
-    stiffness = modulus(solution)
-    numbers = float(stiffness.quantile(0.5)), *map(float, stiffness.hdi())
-    labels |= {f"modulus_{name}": value for name, value in zip(("median", "hdi_low", "hdi_high"), numbers, strict=True)}
+    for label, marginal in (("headline", solution.marginals[model.headline]), ("modulus", modulus(solution))):
+        low, high = marginal.hdi()
+        labels |= {f"{label}_median": float(marginal.quantile(0.5))}
+        labels |= {f"{label}_hdi_low": low, f"{label}_hdi_high": high}
     labels["intervals_of"] = model.meaning
     labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
     units = {parameter.symbol: ", in MPa" if parameter.unit else "" for parameter in model.parameters}

@@ -63,15 +63,12 @@ class LawFit:
         Of the law with the discrepancy.
     alone : LeastSquares or None
         How near the law comes to the measurements by itself; None where it has no stress at some of them.
-    modulus : Marginal
-        Of the law's initial shear modulus, MPa.
     row : mapping of str to number
         Of the law in the table of all.
     """
 
     posterior: Posterior
     alone: LeastSquares | None
-    modulus: Marginal
     row: Mapping[str, Any]
 
     @classmethod
@@ -83,11 +80,10 @@ class LawFit:
         seconds, best_fit = perf_counter() - start, None
         with suppress(ModelError):
             best_fit = least_squares(data, law, posterior.model.priors)
-        modulus = posterior.initial_shear_modulus
-        row = _row(posterior, modulus, best_fit) | {"seconds": seconds}
+        row = _row(posterior, best_fit) | {"seconds": seconds}
         # What every comparison asks for, computed while laws are fitted side by side.
         _ = posterior.left_out, posterior.warnings
-        return cls(posterior, best_fit, modulus, row)
+        return cls(posterior, best_fit, row)
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +255,7 @@ class LawComparison:
     @property
     def _moduli(self) -> Mapping[str, Marginal]:
         """The initial shear modulus of each law, MPa."""
-        return {name: law.modulus for name, law in self.laws.items()}
+        return {name: law.posterior.initial_shear_modulus for name, law in self.laws.items()}
 
     @property
     def _likely(self) -> Mapping[str, float]:
@@ -366,9 +362,10 @@ def _carried_out(
             future.cancel()
 
 
-def _row(posterior: Posterior, modulus: Marginal, best_fit: LeastSquares | None) -> dict[str, Any]:
+def _row(posterior: Posterior, best_fit: LeastSquares | None) -> dict[str, Any]:
     """Return what a table says of a law, moduli in MPa."""
     share, _ = shares_of_discrepancy(posterior.solution)
+    modulus = posterior.initial_shear_modulus
     stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
     ranges_beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
     return {

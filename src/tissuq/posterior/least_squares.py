@@ -13,6 +13,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.inference.quasi_monte_carlo import even_points
 from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.parameters.priors import Prior
 
 __all__ = ["LeastSquares", "least_squares"]
@@ -50,7 +51,7 @@ class LeastSquares:
 
     def stress(self, states: States) -> FloatArray:
         """Return the engineering stress (n,) at states, MPa."""
-        return _stress(self.material, states, self.values)
+        return np.asarray(stresses_by_basis(self.material, states, self.values[None])[0])
 
 
 def least_squares(data: Experiment, material: Material, priors: Mapping[str, Prior]) -> LeastSquares:
@@ -88,7 +89,7 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
     states, stress = data.states.thinned(step), np.concatenate([curve.stress[::step] for curve in data.curves])
     unit = float(np.linalg.norm(stress)) or 1.0  # searches end where gradients are small as numbers
     stress = stress / unit
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    is_linear = material.linear_mask
     supports = [
         np.divide(priors[parameter.symbol].support, unit) for parameter in material.parameters if parameter.is_linear
     ]
@@ -121,15 +122,11 @@ def least_squares(data: Experiment, material: Material, priors: Mapping[str, Pri
     values = np.empty(len(is_linear))
     values[~is_linear] = values_at(scores)[0] if bent else []
     values[is_linear] = unit * linear(stress_basis(material, states, values[~is_linear]))[0]
-    measured, residuals = data.measured, data.measured - _stress(material, data.states, values)
+    measured = data.measured
+    residuals = measured - stresses_by_basis(material, data.states, values[None])[0]
     if not np.isfinite(residuals).all():
         raise ModelError(f"material '{material.name}' has no stress at some of the measurements.")
     total = ((measured - measured.mean()) ** 2).sum()
     nrmse = float(np.sqrt((residuals**2).mean() / (measured**2).mean()))
     r_squared = float(1 - (residuals**2).sum() / total) if total else np.nan
     return LeastSquares(material, values, r_squared, nrmse)
-
-
-def _stress(material: Material, states: States, values: FloatArray) -> FloatArray:
-    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    return np.asarray(stress_basis(material, states, values[~is_linear]) @ values[is_linear])

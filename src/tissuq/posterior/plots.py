@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import Any, Protocol
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.units import stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.solution import Solution
 from tissuq.pictures.answer import answer, discrepancy_shares, has_shares
 from tissuq.pictures.curves import described
@@ -25,14 +25,6 @@ LETTERS_OF_NAME = 24
 """In a line of the name of a fit that is compared."""
 SMALL_PANEL, ROW = 1.25, 0.32
 """Heights of a panel with a density, and of a row of a comparison, in inches."""
-
-
-class HasSolution(Protocol):
-    """Anything with a solution, as a posterior is."""
-
-    @property
-    def solution(self) -> Solution:
-        """The posterior's mixture and marginals."""
 
 
 class PosteriorPlots:
@@ -79,7 +71,7 @@ class PosteriorPlots:
         """
         count = len(self.solution.model.experiment.curves)
         with panels(ax, count, has_strips=has_shares(self.solution)) as drawn:
-            answer(described(self.solution, prob), drawn, self._unit(unit))
+            answer(described(self.solution, prob), drawn, self.unit(unit))
         return drawn.result
 
     def plot_prediction(
@@ -108,7 +100,7 @@ class PosteriorPlots:
         loading = loading_mode(mode) if mode is not None else self.solution.model.experiment.modes[0]
         predicted = predictions(self.solution, loading, stretch, prob)
         with panels(ax, len(predicted)) as drawn:
-            prediction(drawn, predicted, self._unit(unit), prob)
+            prediction(drawn, predicted, self.unit(unit), prob)
         return drawn.result
 
     def plot_parameters(
@@ -129,7 +121,7 @@ class PosteriorPlots:
         for name in names:
             marginal_of(self.solution, name)  # refuses what is no parameter before a figure is made
         with panels(ax, len(names), height=SMALL_PANEL) as drawn:
-            marginals(self.solution, drawn, names, self._unit(unit), prob)
+            marginals(self.solution, drawn, names, self.unit(unit), prob)
         return drawn.result
 
     def plot_discrepancy(self, ax: Any = None, *, prob: float = 0.95) -> Any:
@@ -154,12 +146,13 @@ class PosteriorPlots:
             stability(self.solution, drawn)
         return drawn.result
 
-    def _unit(self, name: str | None) -> Any:
+    def unit(self, name: str | None = None) -> StressUnit:
+        """Return a unit of stress by its name; without one that of the measurements, in which tables are."""
         return stress_unit(name or self.solution.model.experiment.stress_unit)
 
 
 def plot_compare(
-    posteriors: Mapping[str, HasSolution] | Sequence[HasSolution],
+    posteriors: Mapping[str, PosteriorPlots] | Sequence[PosteriorPlots],
     parameter: str | None = None,
     ax: Any = None,
     *,
@@ -211,7 +204,7 @@ def plot_compare(
     return drawn.result
 
 
-def _named(posteriors: Mapping[str, HasSolution] | Sequence[HasSolution]) -> dict[str, Solution]:
+def _named(posteriors: Mapping[str, PosteriorPlots] | Sequence[PosteriorPlots]) -> dict[str, Solution]:
     """Return solutions by name."""
     if isinstance(posteriors, Mapping):
         named = {str(name): posterior.solution for name, posterior in posteriors.items()}

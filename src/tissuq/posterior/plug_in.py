@@ -12,7 +12,7 @@ from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stable_ranges
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, at_noise, with_known_noise
-from tissuq.inference.peak import highest
+from tissuq.inference.peak import highest, top_of_parabola
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.measurement_errors import MeanError, ScaleError, TestError
@@ -254,8 +254,7 @@ def _peak(points: FloatArray, values: FloatArray) -> float:
     if best in (0, len(values) - 1):
         return float(points[best])
     neighbours = slice(best - 1, best + 2)
-    curvature, slope, _ = np.polyfit(points[neighbours], values[neighbours], 2)
-    return float(-slope / (2 * curvature))
+    return top_of_parabola(points[neighbours].tolist(), values[neighbours].tolist())[0]
 
 
 def _sketch(model: StatisticalModel) -> StatisticalModel:

@@ -21,7 +21,7 @@ from tissuq.errors import ModelError
 from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.mechanics import Material
@@ -33,7 +33,7 @@ from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.drawn_materials import Sampling, drawn_ensemble
 from tissuq.posterior.ensemble import Ensemble
-from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries, summaries_in
+from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries_in
 from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.posterior.plots import PosteriorPlots
 from tissuq.posterior.solver import Solver
@@ -74,16 +74,12 @@ class Posterior(PosteriorPlots):
         """The model that was fitted, with its data and priors."""
         return self.solution.model
 
-    def unit(self, name: str | None = None) -> StressUnit:
-        """Return a unit of stress by its name; without one that of the measurements, in which tables are."""
-        return stress_unit(name or self.model.experiment.stress_unit)
-
     @property
     def marginals(self) -> Mapping[str, Marginal]:
         """The marginal posterior of every parameter: mean, sd, density, quantiles, HDI."""
         return self.solution.marginals
 
-    @property
+    @cached_property
     def initial_shear_modulus(self) -> Marginal:
         """The marginal posterior of the material's initial shear modulus, MPa: what an energy discrepancy leaves alone.
 
@@ -139,8 +135,7 @@ class Posterior(PosteriorPlots):
     @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """What a reader of this posterior must know, in sentences with a code and a severity, the severest first."""
-        inside = np.concatenate(self.inside_bands()) if self.solution.is_of_data else np.ones(0, dtype=np.bool_)
-        return tuple(most_severe_first(warnings_about(self.solution, self.stable_ranges, inside)))
+        return tuple(most_severe_first(warnings_about(self.solution, self.stable_ranges, self._is_inside)))
 
     @cached_property
     def answer(self) -> Answer:
@@ -162,11 +157,9 @@ class Posterior(PosteriorPlots):
 
     def answer_with(self, warnings: Sequence[ResultWarning]) -> Answer:
         """Return `answer` where more is known that was implausible, such as of the file."""
-        of_data = self.solution.is_of_data
-        inside = np.concatenate(self.inside_bands()) if of_data else np.ones(0, dtype=np.bool_)
-        of_test = measurement_warnings(self.model.experiment) if of_data else ()
+        of_test = measurement_warnings(self.model.experiment) if self.solution.is_of_data else ()
         all_warnings = most_severe_first([*warnings, *self.warnings, *of_test])
-        return answer_of(self.solution, self.stable_ranges, all_warnings, inside)
+        return answer_of(self.solution, self.stable_ranges, all_warnings, self._is_inside)
 
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.
@@ -465,6 +458,11 @@ class Posterior(PosteriorPlots):
             self._inside[key] = tuple(inside_band(self.solution, curve, **options) for curve in curves)
         return self._inside[key]
 
+    @property
+    def _is_inside(self) -> NDArray[np.bool_]:
+        """Which measurements are inside their predictive band; none of a posterior of somebody who was not measured."""
+        return np.concatenate(self.inside_bands()) if self.solution.is_of_data else np.ones(0, dtype=np.bool_)
+
     @cached_property
     def left_out(self) -> LeaveOneOut:
         """The log density of every measurement given all others, in `data` and in `tissuq.compare`.
@@ -522,8 +520,7 @@ class Posterior(PosteriorPlots):
         return tree_of(self._groups(self.unit(unit)))
 
     def _groups(self, unit: StressUnit) -> dict[str, LabelledGroup]:
-        headline = summaries(self.solution, parameters=[self.model.headline])[self.model.headline]
-        labels = labels_of(self.solution, self.seed, headline)
+        labels = labels_of(self.solution, self.seed)
         left_out = self.left_out if self.solution.is_of_data else None
         return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed, unit, left_out)
 

@@ -237,14 +237,11 @@ def _lag1_correlation(solution: Solution) -> float | None:
     It makes none where errors that are assumed (the resolution of the load cell) are so large that the residuals, as
     correlated as they are, tell no more than those.
     """
-    model, curves = solution.model, []
+    model = solution.model
     if model.is_correlated or model.experiment.size < MIN_MEASUREMENTS:
         return None
     residual = np.asarray(model.white(model.experiment.measured - _mean_curve(solution)))
-    start = 0
-    for count in map(len, model.experiment.curves):
-        curves.append(residual[start : start + count])
-        start += count
+    curves = np.split(residual, np.cumsum([len(curve) for curve in model.experiment.curves])[:-1])
     size = sum(float(curve @ curve) for curve in curves)
     lag1 = sum(float(curve[1:] @ curve[:-1]) for curve in curves) / size if size else 0.0
     if lag1 <= max(MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS / np.sqrt(len(residual))):

@@ -16,7 +16,14 @@ from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.noise import NOISE_SD
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import basis_of, coefficients, correlated_groups, mean_stress, stress_moments
+from tissuq.prediction.moments import (
+    basis_of,
+    coefficients,
+    correlated_groups,
+    mean_stress,
+    stress_moments,
+    values_by_symbol,
+)
 
 __all__ = [
     "MAX_VALUES_AT_ONCE",
@@ -249,10 +256,8 @@ def left_out_log_density(model: StatisticalModel, components: GaussianMixture) -
 
 def _left_out_of_condensed(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
     """Return the same from the means and variances of the stress at the points to which measurements are condensed."""
-    independent = model.discrepancy.independent_variance(
-        {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
-    )
-    mean, variance = stress_moments(model, components, model.states, discrepancy=True, noise=False)
+    independent = model.discrepancy.independent_variance(values_by_symbol(model, components.settings))
+    mean, variance = stress_moments(model, components, model.states)
     white = _white_variance(model, components.settings)[:, :1]
     residual = model.experiment.stress - model.at_measurements(mean.T).T
     leverage = model.at_measurements((variance - independent).T).T / white
@@ -359,6 +364,6 @@ def _with_energies(
 
 def _white_variance(model: StatisticalModel, settings: FloatArray) -> FloatArray:
     """Return the variances (M, n) of what is independent from measurement to measurement."""
-    values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, settings.T, strict=True)}
+    values = values_by_symbol(model, settings)
     levels = model.levels if model.noise.depends_on_level else 0.0
     return np.broadcast_to(model.white_variance(values, levels), (len(settings), len(model.stress)))

@@ -38,6 +38,7 @@ __all__ = [
     "stress_moments",
     "stress_slopes",
     "stresses_beyond",
+    "values_by_symbol",
     "values_of",
     "variance_of_noise",
 ]
@@ -60,6 +61,11 @@ class CorrelatedGroup:
     shape: dict[str, float]
     design: FloatArray
     covariance: SpectralCovariance
+
+
+def values_by_symbol(model: StatisticalModel, settings: FloatArray) -> dict[str, FloatArray]:
+    """Return the nonlinear parameters as columns (M, 1) by symbol, for settings (M, d)."""
+    return {symbol: column[:, None] for symbol, column in zip(model.nonlinear, settings.T, strict=True)}
 
 
 def values_of(
@@ -153,16 +159,14 @@ def stress_moments(
     components: GaussianMixture,
     states: States,
     *,
-    discrepancy: bool,
-    noise: bool,
+    discrepancy: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean (M, g) and variance (M, g) of the stress at states (g,), for every component.
+    """Return mean (M, g) and variance (M, g) of the stress at states (g,), for every component; without noise.
 
     Without the discrepancy it is the model alone (eq. 28); with it, a correlated discrepancy is conditioned on
     the data (eq. 27; differs from the source, whose GP is drawn from its prior). At states of no measured curve only
     a discrepancy that is an energy has a meaning.
     """
-    values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
     basis = borne(model, states.abscissa, basis_of(model, states, components.settings), components.weights)
     if not discrepancy:
@@ -182,9 +186,7 @@ def stress_moments(
             root[rows, :, : spread.shape[2]] += spread
             extra[rows] += variance
     if discrepancy:
-        extra += model.independent_variance(values)
-    if noise:
-        extra += variance_of_noise(model, components, states, mean)
+        extra += model.independent_variance(values_by_symbol(model, components.settings))
     return mean, extra + np.einsum("mgp,mgp->mg", root, root)
 
 
@@ -192,7 +194,7 @@ def variance_of_noise(
     model: StatisticalModel, components: GaussianMixture, states: States, mean: FloatArray
 ) -> FloatArray:
     """Return the variance of the noise at states (g,) where the mean stress is known (M, g), for every component."""
-    values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
+    values = values_by_symbol(model, components.settings)
     return np.asarray(model.noise_variance(values, np.abs(mean)) * model.relative_noise(states) ** 2)
 
 
@@ -210,7 +212,7 @@ def mean_curve_and_slopes(
     """Return `mean_curve` (n,), and its slopes (n, c) along the controls of every test, MPa."""
     model = solution.model
     components = solution.mixture if thinned is None else solution.mixture.thinned(thinned)
-    mean, _ = stress_moments(model, components, model.states, discrepancy=True, noise=False)
+    mean, _ = stress_moments(model, components, model.states)
     curve = model.at_measurements(components.weights @ mean)
     if not with_slopes:
         return curve, None
@@ -228,9 +230,7 @@ def stress_slopes(
 ) -> FloatArray:
     """Return the slopes (M, g, c) of mean stresses (M, g) along the controls of their paths, MPa; zero beyond these."""
     displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
-    moved = [
-        stress_moments(model, components, shifted, discrepancy=discrepancy, noise=False)[0] for shifted in displaced
-    ]
+    moved = [stress_moments(model, components, shifted, discrepancy=discrepancy)[0] for shifted in displaced]
     return (np.stack(moved, axis=-1) - mean[:, :, None]) / STRETCH_STEP
 
 

@@ -54,9 +54,7 @@ class Stress:
         shares = np.array([share_to_end(logs, limits, tilt) for limits in self._limits or [Range()]])
         farthest = shares.max(axis=0)
         inside = drawn_back(states, farthest) if (farthest < 1).any() else states
-        mean, variance = stress_moments(
-            self.model, self.components, inside, discrepancy=self.with_discrepancy, noise=False
-        )
+        mean, variance = stress_moments(self.model, self.components, inside, discrepancy=self.with_discrepancy)
         if (shares == 1).all():
             return self.components, mean, variance
         drawn, probability = self._drawn

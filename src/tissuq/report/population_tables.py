@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isnan
 from typing import TYPE_CHECKING
 
-from tissuq.population.effects import ALL_COVARIATES
+from tissuq.population.draws import ALL_COVARIATES
 from tissuq.population.sample_size import MAX_SPECIMENS
 from tissuq.report.result import Table
 from tissuq.report.tables import interval, percent

@@ -124,7 +124,8 @@ class Weighing:
         each other.
         """
         if self._ends[0] >= self._ends[1]:
-            return self._weighed(0, *np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), 0.0
+            nowhere = np.zeros(0, dtype=np.intp)
+            return self._weighed(0, nowhere, nowhere, np.zeros(0)), 0.0
         points_of_members = self._roughly()
         if not self._is_pulled and self._are_cut(points_of_members):
             self._is_pulled = True
@@ -136,9 +137,8 @@ class Weighing:
         points = Points.joined(points_of_members)
         mass = _masses([points])[0]
         at_even = np.ones(len(mass))
-        for count, indices in zip(
-            _counts(self._lattices, points), (points.second_index, points.first_index), strict=True
-        ):
+        of_blocks = points.second_index, points.first_index
+        for count, indices in zip(_counts(self._lattices, points), of_blocks, strict=True):
             at_even *= np.where(count == 1, 1.0, 2.0 * (indices % 2 == 0))
         last = mass[at_end(self._lattices, points)].sum()
         coarse = at_even @ mass
@@ -181,15 +181,13 @@ class Weighing:
 
     def _known(self, member: int, mask: NDArray[np.bool_]) -> Points:
         """Return points of a lattice (G2, G1) at the known noise, as if the linear parameters had no priors."""
-        lattice, indices, noise_sd = self._lattices[member], np.nonzero(mask), float(self._model.noise.sd({}, 0.0))
-        misfit = lattice.misfit[(*indices, self._index)]
-        amplitudes, nothing = np.zeros((len(misfit), len(self._model.energy_symbols))), np.zeros(len(misfit))
-        pairs = zip(lattice.ratios, indices[::-1], strict=True)
-        for amplitude, (grid, indices_on_grid) in zip(lattice.member.amplitude_indices, pairs, strict=False):
-            amplitudes[:, amplitude] = grid[indices_on_grid] * noise_sd
-        noise, log_weight = np.full(len(misfit), noise_sd), self._log_weights[member][indices]
-        of_member = np.full(len(misfit), member)
-        return Points(of_member, indices[0], indices[1], noise, amplitudes, log_weight, misfit, nothing, nothing)
+        lattice, (second_index, first_index) = self._lattices[member], np.nonzero(mask)
+        count = len(first_index)
+        noise_sd, nothing = np.full(count, float(self._model.noise.sd({}, 0.0))), np.zeros(count)
+        amplitudes = self._amplitudes(lattice, second_index, first_index, noise_sd)
+        log_weight = self._log_weights[member][second_index, first_index]
+        misfit, numbers = lattice.misfit[second_index, first_index, self._index], np.full(count, member)
+        return Points(numbers, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, nothing, nothing)
 
     def _are_cut(self, point_sets: Sequence[Points]) -> bool:
         """Return whether the bounds of linear parameters take away much; and learn below which weight nothing matters.
@@ -210,18 +208,17 @@ class Weighing:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
         lattice, noise = self._lattices[member], self._model.noise
         second_index, first_index = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
-        misfit = lattice.misfit[second_index, first_index, self._index]
         if not noise.parameters:
-            return self._weighed(
-                member, second_index, first_index, misfit, np.full(len(second_index), float(noise.sd({}, 0.0)))
-            )
+            noise_sd = np.full(len(second_index), float(noise.sd({}, 0.0)))
+            return self._weighed(member, second_index, first_index, noise_sd)
         likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY_PROBABILITIES), *np.exp(self._ends))
+        misfit = lattice.misfit[second_index, first_index, self._index]
         most_likely_noise = np.sqrt(misfit / lattice.freedom)
-        candidates = [self._weighed(member, second_index, first_index, misfit, np.clip(most_likely_noise, *likely))]
+        candidates = [self._weighed(member, second_index, first_index, np.clip(most_likely_noise, *likely))]
         rise = _rise(candidates[0])
         for share in np.linspace(0, 1, NOISE_TRIALS)[1:] if rise.max() > HARDLY_PULLED_RISE else ():
             noise_sd = np.clip(most_likely_noise * np.exp(share * rise), *likely)
-            candidates.append(self._weighed(member, second_index, first_index, misfit, noise_sd))
+            candidates.append(self._weighed(member, second_index, first_index, noise_sd))
         best = np.argmax([points.log_weight + points.log_inside for points in candidates], axis=0)
         arrays = zip(*(vars(points).values() for points in candidates), strict=True)
         return Points(*(np.stack(values)[best, np.arange(len(best))] for values in arrays))
@@ -249,20 +246,14 @@ class Weighing:
             logs, cells = low + (high - low) * nodes, (high - low) * cells
         noise_sd = np.exp(logs).ravel()
         rows = np.repeat(np.arange(len(points.misfit)), len(nodes))
-        points_of_noise = self._weighed(
-            member, points.second_index[rows], points.first_index[rows], points.misfit[rows], noise_sd
-        )
-        log_cell = log_prior_of_noise(self._model, self._ratios, noise_sd) + np.log(
-            np.broadcast_to(cells, logs.shape).ravel()
-        )
+        points_of_noise = self._weighed(member, points.second_index[rows], points.first_index[rows], noise_sd)
+        log_cell = np.log(np.broadcast_to(cells, logs.shape).ravel())
+        log_cell += log_prior_of_noise(self._model, self._ratios, noise_sd)
         return replace(points_of_noise, log_weight=points_of_noise.log_weight + log_cell)
 
-    def _weighed(
-        self, member: int, second_index: Places, first_index: Places, misfit: FloatArray, noise_sd: FloatArray
-    ) -> Points:
+    def _weighed(self, member: int, second_index: Places, first_index: Places, noise_sd: FloatArray) -> Points:
         """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
         lattice, symbols = self._lattices[member], self._model.energy_symbols
-        amplitudes = np.zeros((len(first_index), len(symbols)))
         log_weight = lattice.log_likelihood(self._index, second_index, first_index, noise_sd) + np.log(
             lattice.member.probability
         )
@@ -272,15 +263,22 @@ class Weighing:
             strain = self._priors.strain(mean, root) if self._model.noise.parameters else strain
             mean, root, log_mass = self._priors.times(mean, root * noise_sd[:, None, None])
             log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
-        grids_and_indices = ((lattice.ratios[0], first_index), (lattice.ratios[1], second_index))
-        for amplitude, (grid, place_on_grid) in zip(lattice.member.amplitude_indices, grids_and_indices, strict=False):
-            amplitudes[:, amplitude] = grid[place_on_grid] * noise_sd
+        amplitudes = self._amplitudes(lattice, second_index, first_index, noise_sd)
+        for amplitude, indices in zip(lattice.member.amplitude_indices, (first_index, second_index), strict=False):
             log_weight += log_prior_of_amplitude(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
-            log_weight += _log_cells(place_on_grid, lattice.step)
-        member_of_point = np.full(len(first_index), member)
-        return Points(
-            member_of_point, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside
-        )
+            log_weight += _log_cells(indices, lattice.step)
+        misfit, numbers = lattice.misfit[second_index, first_index, self._index], np.full(len(first_index), member)
+        return Points(numbers, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
+
+    def _amplitudes(
+        self, lattice: Lattice, second_index: Places, first_index: Places, noise_sd: FloatArray
+    ) -> FloatArray:
+        """Return the amplitudes (M, a) at points of a lattice; zero where its member has no such block."""
+        amplitudes = np.zeros((len(first_index), len(self._model.energy_symbols)))
+        grids = zip(lattice.ratios, (first_index, second_index), strict=True)
+        for amplitude, (grid, indices) in zip(lattice.member.amplitude_indices, grids, strict=False):
+            amplitudes[:, amplitude] = grid[indices] * noise_sd
+        return amplitudes
 
 
 def known_log_weights(model: StatisticalModel, lattice: Lattice, data_sets: slice) -> FloatArray:

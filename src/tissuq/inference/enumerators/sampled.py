@@ -243,11 +243,7 @@ def _solution(
 
 
 def _diagnostics(draws: Mapping[str, FloatArray], sampled: NutsDraws | SmcDraws) -> Diagnostics:
-    of_all = sampled.of(np.stack(list(draws.values()), axis=2), tuple(draws))
-    rhat, ess_bulk, ess_tail = (
-        dict(zip(draws, map(float, column), strict=True)) for column in (of_all.rhat, of_all.ess_bulk, of_all.ess_tail)
-    )
-    diagnostics = Diagnostics(of_all.converged, of_all.verdict, rhat, ess_bulk, ess_tail)
+    diagnostics = Diagnostics.of(sampled.of(np.stack(list(draws.values()), axis=2), tuple(draws)))
     if isinstance(sampled, SmcDraws):
         return diagnostics
     return replace(diagnostics, divergences=sampled.divergences, least_bfmi=float(sampled.bfmi.min()))
