@@ -35,8 +35,8 @@ class ReadingSettings(Settings):
     columns: dict[str, str | int] = reading(
         default_factory=dict,
         help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, or "
-        "pressure and outer_diameter (or inner_diameter) of a tube, such as stretch=Strain; of the spread of a "
-        "mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
+        "pressure, outer_diameter (or inner_diameter) and axial_stretch of a tube, such as stretch=Strain; of the "
+        "spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
         name="column",
         parse=pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column),
     )
@@ -71,6 +71,11 @@ class ReadingSettings(Settings):
             "thickness": "With --width, instead of --area; with --diameter of a tube its undeformed wall.",
             "diameter": "Of a round specimen, instead of --area; of a tube the undeformed outer one.",
         },
+    )
+    axial_stretch: float | None = reading(
+        None,
+        "Of a tube that was stretched along its axis, then inflated: length over undeformed length [the file's].",
+        gt=0,
     )
     only: dict[str, str | int] = only_rows(READING)
     compression_positive: bool | None = reading(
