@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import tissuq as tq
-from tissuq.errors import InputError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.reading.uneven_stress import Tube
 
 MMHG = 133.322387415e-6  # MPa
@@ -333,3 +333,18 @@ def test_a_pressure_that_falls_as_the_tube_widens_is_refused(tmp_path):
     file.write_text("\n".join([head, *(f"-{row}" for row in rows)]))
     with pytest.raises(InputError, match="not wider where the pressure is larger"):
         tq.read(file, axial_stretch=1.5, **SIZES)
+
+
+def test_fibres_of_a_known_angle_are_found(tmp_path):
+    """Two families at 45 degrees with k1 = 10 kPa and k2 = 1, from three axial stretches."""
+    posterior = tq.fit(
+        written_with_column(tmp_path, [1.2, 1.4, 1.6], fibres), material="neo-hookean+exponential-fibres@45",
+        discrepancy="none", noise_sd="0.05 kPa", tolerances=tq.Tolerances("as-tested"), **SIZES,
+    )  # fmt: skip
+    assert posterior.summary()["mean"][["C10", "k1", "k2"]].tolist() == pytest.approx([20, 10, 1], rel=0.03)
+
+
+def test_an_angle_that_the_hoop_stress_does_not_tell_beside_a_discrepancy_is_refused(tmp_path):
+    file = written_with_column(tmp_path, [1.2, 1.5], fibres)
+    with pytest.raises(ModelError, match=r"fibres across carry none of the stress that was measured.*fibres@45"):
+        tq.fit(file, material="holzapfel-gasser-ogden", discrepancy="auto", **SIZES)
