@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
 READING = "Reading files"
+HELP_ON_AXIAL_STRETCH = (
+    "Of a tube that was stretched along its axis, then inflated: length over undeformed length; to fit several files "
+    "once for each [the file's]."
+)
 reading = partial(option, group=READING)
 """Declares an option of reading."""
 
@@ -72,11 +76,7 @@ class ReadingSettings(Settings):
             "diameter": "Of a round specimen, instead of --area; of a tube the undeformed outer one.",
         },
     )
-    axial_stretch: float | None = reading(
-        None,
-        "Of a tube that was stretched along its axis, then inflated: length over undeformed length [the file's].",
-        gt=0,
-    )
+    axial_stretch: float | None = reading(None, HELP_ON_AXIAL_STRETCH, gt=0)
     only: dict[str, str | int] = only_rows(READING)
     compression_positive: bool | None = reading(
         None, "Which the file counts as positive [its sign].", negative="tension-positive"
