@@ -31,6 +31,7 @@ TEXTBOOK = {  # points, F, and the row and column of the nominal stresses; the t
     "constrained-uniaxial": (STRETCH, lambda x: diagonal(x, 1.0), [(0, 0), (1, 1)]),
     "biaxial": (PAIRS, lambda x: diagonal(*x), [(0, 0), (1, 1)]),
     "thin-tube": (PAIRS, lambda x: diagonal(*x), [(0, 0), (1, 1)]),
+    "inflated-tube": (PAIRS, lambda x: diagonal(*x), [(0, 0)]),
     "simple-shear": (SHEAR, sheared, [(0, 1)]),
     "simple-shear-normal": (SHEAR, sheared, [(0, 1), (1, 1)]),
 }

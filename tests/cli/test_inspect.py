@@ -283,6 +283,28 @@ def test_one_axis_of_a_biaxial_machine_needs_no_mode(cli, here):
     assert "'stress y" in said.out
 
 
+def test_tubes_at_several_axial_stretches_are_fitted_from_a_file_each(cli, here):
+    inner, outer = 1.25, 1.5
+    for axial in (1.3, 1.5):
+        radius = np.linspace(outer * axial**-0.5, 1.5, 30)
+        x = (axial * radius**2 - outer**2) / inner**2, (axial * radius**2 - outer**2) / outer**2
+        inside, outside = (np.log(1 + each) - 1 / (1 + each) for each in x)  # p of C10 = 20 kPa, by parts
+        pressure = 0.02 / axial * (inside - outside) / 133.322387415e-6
+        rows = [f"{p:.8g},{2e3 * r:.8g}" for p, r in zip(pressure, radius, strict=True)]
+        (here / f"at {axial}.csv").write_text("\n".join(["Pressure (mmHg),Outer diameter (um)", *rows]))
+    files, sizes = ["at 1.3.csv", "at 1.5.csv"], ["--diameter", "3 mm", "--thickness", "0.25 mm"]
+    options = [*sizes, "--specimen", "A", "--discrepancy", "none", "--tolerance", "none", "--noise-sd", "0.01"]
+    assert cli("fit", *files, *options).status == 2
+    fit = cli("fit", *files, *options, "--axial-stretch", "1.3", "--axial-stretch", "1.5", "--no-figures", "--out", "A")
+    assert fit.status == 0, fit.err
+    assert "initial shear modulus  40" in fit.out
+    again = cli("fit", "--config", "A/run.toml", "--no-figures", "--out", "again")
+    assert again.status == 0, again.err
+    wrong = cli("fit", *files, *options, *["--axial-stretch", "1.3"] * 3)
+    assert wrong.status == 2
+    assert "--axial-stretch is given 3 times for 2 files" in wrong.err
+
+
 def test_a_tube_is_read_by_the_flags_that_the_first_message_gives(cli, here):
     inner, outer, radius = 1.25, 1.5, np.linspace(1.5, 1.9, 30)
     x = (radius**2 - outer**2) / inner**2, (radius**2 - outer**2) / outer**2

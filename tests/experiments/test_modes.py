@@ -18,8 +18,8 @@ EVERY_STRESS = pytest.mark.parametrize("measured", MEASURED, ids=str)
 
 def test_the_modes_are_those_of_the_documentation():
     assert list(loading_modes()) == [
-        "uniaxial", "equibiaxial", "planar", "simple-shear", "simple-shear-normal", "biaxial", "constrained-uniaxial",
-        "thin-tube",
+        "uniaxial", "equibiaxial", "planar", "simple-shear", "simple-shear-normal", "biaxial", "inflated-tube",
+        "constrained-uniaxial", "thin-tube",
     ]  # fmt: skip
 
 

@@ -3,7 +3,7 @@ import pytest
 
 import gallery
 import tissuq as tq
-from tissuq.pictures.curves import share_along, ways_of
+from tissuq.pictures.curves import described, share_along, ways_of
 
 BIAXIAL = tq.loading_modes()["biaxial"]()
 
@@ -42,3 +42,22 @@ def test_points_that_follow_no_path_are_drawn_by_themselves(points):
     ways = ways_of(BIAXIAL, points, points[:, 0])
     assert not any(way.is_curve for way in ways)
     assert sorted(np.concatenate([way.indices for way in ways])) == list(range(len(points)))
+
+
+def test_a_tube_is_drawn_along_a_curve_at_each_axial_stretch():
+    """In whatever order the rows are, and though one axial stretch is measured with a little scatter."""
+    hoop, axial = np.tile(np.linspace(0.9, 1.2, 10), 2), np.repeat([1.3, 1.5], 10)
+    order = np.random.default_rng(3).permutation(20)
+    points = np.column_stack([hoop, axial + 0.001 * np.sin(np.arange(20))])[order]
+    data = tq.Experiment("inflated-tube", points, 0.04 * (hoop - hoop**-3 * axial**-2)[order])
+    posterior = gallery.fit(data, discrepancy="none", noise_sd=1e-4)
+    (drawn,) = described(posterior.solution)
+    assert [way.is_curve for way in drawn.ways] == [True, True]
+    for way, rows, at in zip(drawn.ways, drawn.measured_rows, (1.3, 1.5), strict=True):
+        on_way = drawn.points[way.indices]
+        np.testing.assert_allclose(on_way[:, 1], at, atol=0.001)
+        np.testing.assert_allclose(on_way[[0, -1], 0], [0.9, 1.2])
+        np.testing.assert_allclose(data.stretch[rows, 1], at, atol=0.001)
+        assert len(rows) == 10
+    expected = 0.04 * (drawn.points[:, 0] - drawn.points[:, 0] ** -3 * drawn.points[:, 1] ** -2)
+    np.testing.assert_allclose(drawn.stress.median, expected, atol=2e-4)

@@ -143,7 +143,6 @@ def _test(settings: Mapping[str, Any], inspection: Inspection) -> dict[str, Any]
 def _curve(reading: Reading, number: int) -> dict[str, Any]:
     """Return what is drawn of a stress: all rows, those that are used, and where something happened."""
     used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
-    controls = reading.experiment.mode.controls
     regions = [
         {"kind": region.kind, **_points(used.stretch[number][region.rows], used.stress[number][region.rows], unit)}
         for region in reading.regions[number]
@@ -151,7 +150,7 @@ def _curve(reading: Reading, number: int) -> dict[str, Any]:
     ]
     return {
         "label": used.labels[number],
-        "x": controls[0].name if len(controls) == 1 else "stretch",
+        "x": reading.experiment.mode.abscissa_name,
         "y": f"engineering stress [{unit.name}]",
         "recorded": _points(reading.recorded.stretch[number], reading.recorded.stress[number], unit),
         "used": _points(used.stretch[number], used.stress[number], unit),

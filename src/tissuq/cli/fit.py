@@ -52,11 +52,13 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     files = files_of(paths)
     read_as = {name: call.stated.pop(name) for name in ReadingSettings.model_fields if name in call.stated}
     modes, noise = read_as.pop("mode", None), call.stated.pop("noise_sd", None)
+    axial_stretches: list[float] | None = read_as.pop("axial_stretch", None)
     if call.config:
-        _check_once(call.how.specimen, modes, noise)
+        _check_once(call.how.specimen, modes, noise, axial_stretches)
         read_as |= {"mode": modes[0]} if modes else {}
+        read_as |= {"axial_stretch": axial_stretches[0]} if axial_stretches else {}
     of_files = [] if call.config else files
-    of_tests, read_tests = measured(of_files, read_as, modes, call.how.specimen, noise, print)
+    of_tests, read_tests = measured(of_files, read_as, modes, call.how.specimen, noise, axial_stretches, print)
     if not (paths or call.config):
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     if call.config and len(files) > 1:
@@ -117,11 +119,16 @@ def _fitted(
     return of_material
 
 
-def _check_once(specimens: Sequence[str], modes: Sequence[str] | None, noise: Sequence[float | str] | None) -> None:
+def _check_once(
+    specimens: Sequence[str],
+    modes: Sequence[str] | None,
+    noise: Sequence[float | str] | None,
+    axial_stretches: Sequence[float] | None,
+) -> None:
     """Refuse what is given for each of several files, which a configuration says of its tests."""
     if specimens:
         raise InputError("--specimen names the specimens of FILES; in a configuration, 'specimen' of a test does.")
-    for typed, values in (("--mode", modes), ("--noise-sd", noise)):
+    for typed, values in (("--mode", modes), ("--noise-sd", noise), ("--axial-stretch", axial_stretches)):
         if values and len(values) > 1:
             raise InputError(f"{typed} is given {len(values)} times beside --config; give it once.")
 

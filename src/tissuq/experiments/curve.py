@@ -75,8 +75,7 @@ class Curve:
     @property
     def abscissa_name(self) -> str:
         """What `abscissa` is called on an axis."""
-        controls = self.mode.controls
-        return controls[0].name if len(controls) == 1 else "stretch"
+        return self.mode.abscissa_name
 
     @property
     def is_back(self) -> NDArray[np.bool_]:

@@ -16,10 +16,14 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
 from tissuq.model.tolerances import Tolerances
 
-__all__ = ["check_linearity", "check_parts", "check_separable"]
+__all__ = ["check_angles", "check_linearity", "check_parts", "check_separable"]
 
 FloatArray = NDArray[np.float64]
 
+ANGLES = (0.0, np.pi / 2)
+"""Between which angles of fibres lie."""
+NO_STRESS = 1e-12
+"""Stress over that at the usual angle up to which fibres carry none."""
 MAX_CONDITION_NUMBER = 1e10
 """Largest condition number of columns of unit length whose parameters the data can separate."""
 
@@ -106,6 +110,29 @@ def check_separable(triangle: FloatArray, name: str, symbols: tuple[str, ...]) -
             f"the stretches of experiment '{name}' cannot separate the parameters {', '.join(symbols)}: measure at "
             "more or other stretches, or choose a simpler material or discrepancy."
         )
+
+
+def check_angles(
+    material: Material, discrepancy: Discrepancy, experiment: Experiment, usual_bent: tuple[float, ...]
+) -> None:
+    """Refuse fibres whose angle is to be found, beside an energy, where across the tests they carry no measured stress.
+
+    The nearer they lie to that angle, the stiffer they may be, and the energy takes up what they leave of the stress.
+    """
+    usual = np.linalg.norm(stress_basis(material, experiment.states, usual_bent), axis=0)
+    for number, parameter in enumerate(p for p in material.parameters if not p.is_linear):
+        if parameter.support != ANGLES:
+            continue
+        bent = np.array(usual_bent)
+        bent[number] = ANGLES[1]
+        across = np.linalg.norm(stress_basis(material, experiment.states, bent), axis=0)
+        if (across <= NO_STRESS * usual).any():
+            raise ModelError(
+                f"the angle {parameter.symbol} of the fibres in '{material.name}' is not determined beside the "
+                f"discrepancy '{discrepancy.name}': fibres across carry none of the stress that was measured, that of "
+                "one axis. Give the angle where it is known, as in exponential-fibres@45, fit without a discrepancy "
+                "(--discrepancy none), or measure the stresses of both axes."
+            )
 
 
 @lru_cache(maxsize=256)

@@ -15,7 +15,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.rays import Range
-from tissuq.model.compatibility import check_linearity, check_parts, check_separable
+from tissuq.model.compatibility import check_angles, check_linearity, check_parts, check_separable
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member, NoDiscrepancy
 from tissuq.model.discrepancy.blocks import EnergyBlock
 from tissuq.model.error_model import ErrorModel
@@ -379,6 +379,8 @@ class StatisticalModel(ErrorModel):
             ends = curve.path.at([curve.points.min(axis=0), curve.points.max(axis=0)])
             check_linearity(self.material, ends, self.usual_bent)
         check_separable(self.statistics.triangle[:, :-1], name, self.column_symbols)
+        if self.energy_symbols and not self.material.is_isotropic:
+            check_angles(self.material, self.discrepancy, self.experiment, self.usual_bent)
 
 
 def _basis(material: Material, discrepancy: Discrepancy, states: States, bent: ArrayLike) -> FloatArray:

@@ -141,7 +141,7 @@ def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
             median = within(shown.median[indices] / unit.to_mpa, limits)
             line(axis, shown.stretch[indices], median, color=color, style=style, width=1.3, is_path=is_curve,
                  label="" if number else label)  # fmt: skip
-        rows = slice(None) if is_one else indices
+        rows = slice(None) if is_one else described.measured_rows[number]
         points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
                marker=MARKERS[number % len(MARKERS)], is_back=curve.is_back[rows])  # fmt: skip
     axis.set_ylim(limits)

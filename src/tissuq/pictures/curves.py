@@ -19,7 +19,16 @@ from tissuq.prediction.bands import Band, inside_band, predict_bands
 from tissuq.prediction.moments import drawn_curves
 from tissuq.prediction.scores import root_mean_square
 
-__all__ = ["Described", "Way", "described", "is_determined", "points_along", "share_along", "ways_of"]
+__all__ = [
+    "Described",
+    "Way",
+    "described",
+    "is_determined",
+    "points_along",
+    "rows_where_held",
+    "share_along",
+    "ways_of",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -29,6 +38,8 @@ RETURN, MOST_WAYS = 0.3, 7
 """Decrease of the deformation at which a new path begins, over its largest change; and the most paths of a picture."""
 NEARLY = 0.02
 """Changes of a control that do not count, over its range."""
+SAME_HELD = 0.01
+"""Difference of a control up to which it is held at one value."""
 NO_STRESS = 0.02
 """Stress over the largest one of a curve, below which there is no share of it."""
 
@@ -95,6 +106,15 @@ class Described:
         return ways_of(self.curve.mode, self.points, self.stress.stretch)
 
     @cached_property
+    def measured_rows(self) -> list[NDArray[np.intp]]:
+        """The measurements of each of `ways`."""
+        if held := rows_where_held(self.curve.mode, self.curve.points):
+            return held
+        if len(self.ways) == 1:
+            return [np.argsort(self.curve.abscissa, kind="stable")]
+        return [way.indices for way in self.ways]
+
+    @cached_property
     def inside(self) -> NDArray[np.bool_]:
         """Which measurements are inside the band of new ones, with the discrepancy."""
         if self.known_inside is not None:
@@ -131,12 +151,15 @@ def is_determined(material: Band, stress: Band) -> bool:
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:
     """Return the paths that points (g,) or (g, c) of a mode follow: a new one begins where a test goes back to rest.
 
-    Each in the order of what it is drawn against. Where nothing changes along that, or there are many, it is no curve.
+    Points of a tube that was inflated at several axial stretches follow one at each of them. Each path is in the order
+    of what it is drawn against. Where nothing changes along that, or there are many, it is no curve.
     """
     if points.ndim == 1:
         return [Way(np.argsort(abscissa, kind="stable"), True)]
     size = np.linalg.norm(points - mode.reference, axis=1)
     starts = 1 + np.flatnonzero(np.diff(size) < -RETURN * np.ptp(size))
+    if held := rows_where_held(mode, points):
+        return [Way(rows[np.argsort(abscissa[rows], kind="stable")], True) for rows in held]
     branches = np.split(np.arange(len(points)), starts)
     nearly, smallest_change = NEARLY * np.ptp(points, axis=0), NEARLY * np.ptp(abscissa)
     ways = []
@@ -153,9 +176,27 @@ def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list
     return ways
 
 
+def rows_where_held(mode: LoadingMode, points: FloatArray) -> list[NDArray[np.intp]]:
+    """Return the rows at each value of the second control of a mode with one stress, along the first one.
+
+    Nothing of other modes, and where it is held at no few values.
+    """
+    if not (len(mode.stresses) == 1 and len(mode.controls) == 2):
+        return []
+    column = points[:, 1]
+    order = np.argsort(column, kind="stable")
+    groups = np.split(order, 1 + np.flatnonzero(np.diff(column[order]) > SAME_HELD))
+    are_held = all(np.ptp(column[rows]) <= 2 * SAME_HELD for rows in groups)
+    return groups if are_held and len(groups) <= MOST_WAYS else []
+
+
 def points_along(curve: Curve, count: int) -> FloatArray:
-    """Return points over the range of a curve, or its own where the test has several controls."""
+    """Return points over the range of a curve, at each axial stretch of a tube, or its own for other controls."""
     points = curve.points
+    if held := rows_where_held(curve.mode, points):
+        ends = [(points[rows, 0].min(), points[rows, 0].max(), points[rows, 1].mean()) for rows in held]
+        lines = [np.column_stack([np.linspace(low, high, count), np.full(count, at)]) for low, high, at in ends]
+        return np.concatenate(lines)
     return points if points.ndim > 1 else np.linspace(points.min(), points.max(), count)
 
 

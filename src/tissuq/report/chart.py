@@ -16,7 +16,7 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
-from tissuq.pictures.curves import Described, is_determined
+from tissuq.pictures.curves import Described, is_determined, rows_where_held
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands
 from tissuq.report.figures import described_curves
@@ -120,10 +120,12 @@ def _measured(described: Sequence[Described]) -> Iterator[_Test]:
         curve = described_curve.curve
         name = curve.name if len(described) > 1 else curve.mode.name
         name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
-        for number, (indices, is_curve) in enumerate(described_curve.ways, 1):
-            rows = _spread(np.argsort(curve.abscissa, kind="stable") if described_curve.points.ndim == 1 else indices)
+        pairs = zip(described_curve.ways, map(_spread, described_curve.measured_rows), strict=True)
+        for number, ((indices, is_curve), rows) in enumerate(pairs, 1):
             named = f"{name}, path {number}" if len(described_curve.ways) > 1 else name
             points = described_curve.points[_drawn(indices, is_curve)]
+            if rows_where_held(curve.mode, curve.points):
+                named = f"{name}, {curve.mode.controls[1].name} {points[0, 1]:.4g}"
             abscissa, stress, is_back = curve.abscissa[rows], curve.stress[rows], curve.is_back[rows]
             yield _Test(named, curve.mode, curve.channel, points, abscissa, stress, is_curve, is_back)
 

@@ -303,8 +303,10 @@ def _calibrated_end(prediction: Prediction) -> int:
 
 
 def _changes(prediction: Prediction) -> FloatArray:
-    """Return how far every point is from rest."""
+    """Return how far every point is from rest; of a tube that was stretched, how much wider than the narrowest."""
     points = prediction.points.reshape(len(prediction.points), -1)
+    if len(prediction.mode.controls) > len(prediction.mode.stresses):
+        return np.asarray(points[:, 0] - points[:, 0].min())
     changes: FloatArray = np.abs(points - np.atleast_1d(prediction.mode.reference)).max(axis=1)
     return changes
 

@@ -72,6 +72,7 @@ def measured(
     modes: Sequence[str] | None,
     specimens: Sequence[str] | None,
     noise: Sequence[float | str] | None,
+    axial_stretches: Sequence[float] | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> tuple[dict[str, Any], list[Reading | None]]:
     """Return the settings of a fit that say what was measured: of the only test, or of each of several.
@@ -89,9 +90,10 @@ def measured(
 
     if not files:
         return reading | {"noise_sd": noise[0] if noise else None}, []
+    held = _for_each([1] * len(files), "--axial-stretch", axial_stretches) or [None] * len(files)
     of_files = [
-        find_tests(file, reading | {"mode": mode}, is_only_file=len(files) == 1)
-        for file, mode in zip(files, _modes(files, modes), strict=True)
+        find_tests(file, reading | {"mode": mode, "axial_stretch": stretch}, is_only_file=len(files) == 1)
+        for file, mode, stretch in zip(files, _modes(files, modes), held, strict=True)
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
     readings = [of_test for of_file in of_files for _, of_test in of_file]

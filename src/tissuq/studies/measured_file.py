@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
 READING = "Reading files"
+HELP_ON_AXIAL_STRETCH = (
+    "Of a tube that was stretched along its axis, then inflated: length over undeformed length; to fit several files "
+    "once for each [the file's]."
+)
 reading = partial(option, group=READING)
 """Declares an option of reading."""
 
@@ -35,8 +39,8 @@ class ReadingSettings(Settings):
     columns: dict[str, str | int] = reading(
         default_factory=dict,
         help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, or "
-        "pressure and outer_diameter (or inner_diameter) of a tube, such as stretch=Strain; of the spread of a "
-        "mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
+        "pressure, outer_diameter (or inner_diameter) and axial_stretch of a tube, such as stretch=Strain; of the "
+        "spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
         name="column",
         parse=pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column),
     )
@@ -72,6 +76,7 @@ class ReadingSettings(Settings):
             "diameter": "Of a round specimen, instead of --area; of a tube the undeformed outer one.",
         },
     )
+    axial_stretch: float | None = reading(None, HELP_ON_AXIAL_STRETCH, gt=0)
     only: dict[str, str | int] = only_rows(READING)
     compression_positive: bool | None = reading(
         None, "Which the file counts as positive [its sign].", negative="tension-positive"

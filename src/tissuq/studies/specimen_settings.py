@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
+from tissuq.studies.measured_file import (
+    HELP_ON_AXIAL_STRETCH,
+    READING,
+    FittedSettings,
+    MeasuredFile,
+    MeasuredTest,
+    ReadingSettings,
+)
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import noises, priors
 from tissuq.studies.settings import looked_up
@@ -70,6 +77,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     mode: str | None = option(
         None, "Loading mode [uniaxial]; once for each of several files [as they or their names say].", takes=list[str]
     )
+    axial_stretch: float | None = option(None, HELP_ON_AXIAL_STRETCH, group=READING, gt=0, takes=list[float])
     stable_in: tuple[str, ...] = option((), "Require stability in this loading mode, or in all; repeat for more.")
     held_out: bool = option(False, "Also predict each of several tests from the others.")
 

@@ -33,6 +33,7 @@ MOVED = {  # F a step further than at a point, for every stress; the number of a
     "biaxial-2-2": (lambda x, step: gradient(x[0], x[1] + step), 1),
     "thin-tube-1-1": (lambda x, step: gradient(x[0] + step, x[1]), 1),
     "thin-tube-2-2": (lambda x, step: gradient(x[0], x[1] + step), 1),
+    "inflated-tube-1-1": (lambda x, step: gradient(x[0] + step, x[1]), 1),
     "simple-shear-1-2": (lambda x, step: gradient(1.0, 1.0, x + step), 1),
     "simple-shear-normal-1-2": (lambda x, step: gradient(1.0, 1.0, x + step), 1),
     "simple-shear-normal-2-2": (lambda x, step: gradient(1.0, 1.0 + step, x), 1),

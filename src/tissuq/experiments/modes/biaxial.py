@@ -1,4 +1,4 @@
-"""Modes in the plane of a sheet whose faces are free: biaxial, a thin tube, one axis held, stretches imposed."""
+"""Modes in the plane of a sheet whose faces are free: biaxial, tubes, one axis held, stretches imposed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tissuq.experiments.modes.mode import Control, LoadingMode
 from tissuq.experiments.modes.one_control import Planar
 from tissuq.experiments.modes.path import Deformation, Path
 
-__all__ = ["Biaxial", "ConstrainedUniaxial", "ImposedStretches", "ThinTube"]
+__all__ = ["Biaxial", "ConstrainedUniaxial", "ImposedStretches", "InflatedTube", "ThinTube"]
 
 
 def _sheet(stretch_1: Any, stretch_2: Any) -> Deformation:
@@ -106,6 +106,27 @@ class ThinTube(Biaxial):
         of_hoop = pressure * radius / thickness * hoop * axial
         of_axis = reduced_force / (2 * pi * radius * thickness) + pressure * radius / (2 * thickness) * hoop**2
         return np.stack([of_hoop, of_axis], axis=-1)
+
+
+class InflatedTube(LoadingMode):
+    """Inflation of a tube at any axial stretch: hoop and axial stretch, as `ThinTube`, with the hoop stress alone.
+
+    That is dW/dl_hoop at the axial stretch, l_hoop times which is the hoop less the radial Cauchy stress. At an axial
+    stretch l_axial it is zero where l_hoop = l_axial^-1/2 if the material is isotropic; at 1 the mode is `Planar`.
+    Files of pressure and diameter are read in it.
+    """
+
+    name = "inflated-tube"
+    description = "inflation of a tube held at any axial stretch, with the hoop stress alone"
+    controls = (Control("hoop stretch"), Control("axial stretch"))
+    stresses = ("hoop engineering stress",)
+
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return _sheet(point[..., 0], point[..., 1]).stretches
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return (_Pulled(0),)
 
 
 class ConstrainedUniaxial(LoadingMode):

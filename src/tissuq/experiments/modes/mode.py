@@ -25,7 +25,7 @@ WORDS_FOR_MODES = {
     "torsion": "simple-shear",
     "pure-shear": "planar",
     "equi-biaxial": "equibiaxial",
-    "inflation": "thin-tube",
+    "inflation": "inflated-tube",
 }
 """Words of laboratories for loading modes that have another name here."""
 
@@ -113,6 +113,11 @@ class LoadingMode(ABC):
     def is_curve(self) -> bool:
         """Whether it is one stress against one stretch."""
         return self.controls == (STRETCH,) and len(self.stresses) == 1
+
+    @property
+    def abscissa_name(self) -> str:
+        """What stresses are drawn against: the first control, or where there are several stresses a stretch of each."""
+        return self.controls[0].name if 1 in (len(self.controls), len(self.stresses)) else "stretch"
 
     @property
     def reference(self) -> Any:

@@ -34,7 +34,7 @@ from tissuq.experiments.reading.recognition import (
     with_columns_of_tube,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLES
+from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLE_OF_AXIAL_STRETCH, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
 __all__ = ["about_stress", "choose_columns", "find_column", "mapping_of_each_stress"]
@@ -53,7 +53,8 @@ def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> 
     InputError
         When a role or column does not exist, several columns fit, or none does.
     """
-    count, mapping, axis = len(mode.stresses), options.get("columns"), options.get("axis")
+    count, axis = len(mode.stresses), options.get("axis")
+    mapping = {role: name for role, name in (options.get("columns") or {}).items() if role != ROLE_OF_AXIAL_STRETCH}
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)

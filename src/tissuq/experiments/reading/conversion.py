@@ -10,6 +10,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.axial_stretch import axial_stretch_of, note_of_tube
 from tissuq.experiments.reading.columns import about_stress, mapping_of_each_stress
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions
@@ -18,7 +19,7 @@ from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice
 from tissuq.experiments.reading.rows_of_tests import check_one_specimen, columns_only
 from tissuq.experiments.reading.side_by_side import test_beside
 from tissuq.experiments.reading.spread import Spread, spread_of
@@ -26,7 +27,7 @@ from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE
 
-__all__ = ["as_columns", "measured_rows", "stress_measure_of", "with_engineering_stress"]
+__all__ = ["as_columns", "measured_rows", "points_of", "stress_measure_of", "with_engineering_stress"]
 
 LONG = "engineering stress of "
 """How names of several stresses begin; what is said of each of them begins with the axis alone."""
@@ -52,12 +53,13 @@ def measured_rows(
         words = [Path(table.file).name, table.sheet, table.title, options.get("name") or ""]
         words += ["compression"] if options.get("compression_positive") else []
         dimensions = of_block(table, columns[0], (numbers[0][0], numbers[0][1]), dimensions, words)
+    axial = axial_stretch_of(table, mode, columns, options)
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
         is_force = choice.load == "force" and force_in(table, choice.stress, options) is FORCE
-        size = replace(size, divide_forces=is_force)
+        size = replace(size, divide_forces=is_force, axial_stretch=1.0 if axial is None else axial.values)
         with about_stress(number, labels, mode):
             load, counted = without_zero(table, choice, load, options)
             deformation, given_way = without_machine(table, choice, deformation, load, options)
@@ -66,7 +68,8 @@ def measured_rows(
             spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
         stretches.append(stretch)
         stretch_steps.append(f"{step}{given_way}")
-        loads.append(replace(stress, source=f"{stress.source}{counted}"))
+        note = note_of_tube(size.tube[0], axial) if choice.load == PRESSURE else stress.note
+        loads.append(replace(stress, source=f"{stress.source}{counted}", note=note))
     measured = MeasuredRows(
         table=table,
         rows=np.arange(len(table.rows)),
@@ -74,9 +77,12 @@ def measured_rows(
         stress=np.stack([load.stress for load in loads]),
         standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
         labels=tuple(label.removeprefix(LONG) for label in labels),
+        axial_stretch=None if axial is None else axial.values,
     )
     for name, value in columns_only(table, options.get("only")).items():
         measured = measured.with_step(f"only rows with '{value}' in column '{name}'")
+    if axial is not None:
+        measured = measured.with_step(axial.source)
     measured = measured.with_step(*stretch_steps).with_step(*(load.source for load in loads))
     if any(spread.source for spread in spreads):
         measured = measured.with_step(*(spread.source for spread in spreads))
@@ -113,6 +119,12 @@ def stress_measure_of(table: Table, choices: Sequence[ColumnChoice]) -> StressMe
             "(--column stress=NAME --column stress2=NAME)."
         )
     return STRESS_MEASURES[types[0]]
+
+
+def points_of(mode: LoadingMode, measured: MeasuredRows, stretch: Column | None = None) -> Column:
+    """Return the points of a mode (n,) or (n, c): the stretches of rows, or others, and the axial stretch of a tube."""
+    columns = (measured.stretch if stretch is None else stretch)[: len(mode.controls)]
+    return as_columns(columns if measured.axial_stretch is None else np.vstack([columns, measured.axial_stretch]))
 
 
 def as_columns(rows: Column) -> Column:

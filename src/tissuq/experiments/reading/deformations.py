@@ -237,11 +237,14 @@ def _from_diameter(
     is_outer = choice.measure == DIAMETERS[0]
     face, letter = (tube.outer, "B") if is_outer else (tube.inner, "A")
     try:
-        stretch = tube.stretch(values * factor / 2, face)
+        stretch = tube.stretch(values * factor / 2, face, dimensions.axial_stretch)
     except InputError as error:
         raise InputError(f"{table.place(choice.deformation, int(np.argmin(values)))}: {error}") from error
     side = f"{choice.measure.replace('_', ' ')} d = column {table.label(choice.deformation)} in {unit_source}"
-    return stretch, f"hoop stretch in the middle of the wall = sqrt(1 + (d^2/4 - {letter}^2)/(A B)): {side}, {words}"
+    square = f"1 + (d^2/4 - {letter}^2)/(A B)"
+    if not isinstance(dimensions.axial_stretch, float):
+        square = f"(1 + (axial stretch x d^2/4 - {letter}^2)/(A B)) / axial stretch"
+    return stretch, f"hoop stretch in the middle of the wall = sqrt({square}): {side}, {words}"
 
 
 def _zero(text: str, first_value: float, quantity: Quantity) -> tuple[float, str]:

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isclose, pi, prod
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tissuq.errors import InputError
 from tissuq.experiments.reading.stated_sizes import StatedSize
 from tissuq.experiments.reading.uneven_stress import Tube
@@ -44,7 +47,7 @@ class Dimensions:
     Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user;
     ``divide_forces`` says that the cross-section is needed, beside whatever else is; ``averages`` of which measurements
     a size is the mean, and ``is_one_of_several`` that the table holds several tests;
-    ``open_height`` asks which side is the height.
+    ``open_height`` asks which side is the height, and ``axial_stretch`` is that at which a tube is held, in every row.
     """
 
     file: str
@@ -57,6 +60,7 @@ class Dimensions:
     averages: tuple[str, ...] = ()
     is_one_of_several: bool = False
     open_height: str = ""
+    axial_stretch: NDArray[np.float64] | float = 1.0
 
     @property
     def length(self) -> Dimension:

@@ -14,11 +14,18 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.modes import InflatedTube, Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
+from tissuq.experiments.reading.axial_stretch import column_of_axial_stretch
 from tissuq.experiments.reading.columns import choose_columns
-from tissuq.experiments.reading.conversion import as_columns, measured_rows, stress_measure_of, with_engineering_stress
+from tissuq.experiments.reading.conversion import (
+    as_columns,
+    measured_rows,
+    points_of,
+    stress_measure_of,
+    with_engineering_stress,
+)
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
@@ -84,6 +91,8 @@ class Reading:
         Standard errors of each stress, where it is the mean of several specimens.
     doubts : tuple of str
         What was assumed, and where sizes as given differ from those in the file.
+    axial_column : int, optional
+        The column of the axial stretch of a tube, where it is read.
     """
 
     experiment: Experiment
@@ -97,6 +106,7 @@ class Reading:
     mode_source: str = ""
     spreads: tuple[Spread, ...] = ()
     doubts: tuple[str, ...] = ()
+    axial_column: int | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -131,6 +141,9 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         Entries of ``columns``: the name of a column, or its number from 1; those of a second axis end in 2.
     pressure, outer_diameter, inner_diameter : str or int, optional
         Likewise, of a tube.
+    axial_stretch : float, optional
+        Of a tube in the mode ``inflated-tube``: the length at which it is held over the undeformed one. Without it the
+        file's column of that name, or the one in ``columns`` under ``axial_stretch``.
     length, area, width, thickness, diameter : str, optional
         Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
     unit : str, optional
@@ -293,6 +306,7 @@ def read_rows(
     choices = tuple(labelled_choices.values())
     if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
         check_not_sheared(table)
+    axial_column = column_of_axial_stretch(table, options) if isinstance(mode, InflatedTube) else None
     absent = set[int]()
     try:
         measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
@@ -300,6 +314,7 @@ def read_rows(
         raise
     except InputError:
         columns = list(dict.fromkeys(column for choice in choices for column in (choice.deformation, choice.stress)))
+        columns += [] if axial_column is None else [axial_column]
         readable = table.without_faulty(columns, options.get("leave_out")).without_missing(columns)
         if readable is table:
             raise
@@ -331,7 +346,7 @@ def read_rows(
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
         recorded, used = (
-            with_engineering_stress(mode, stress_measure, measured, as_columns(stretch[: len(mode.controls)]))
+            with_engineering_stress(mode, stress_measure, measured, points_of(mode, measured, stretch))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
         )
         if mode.controls != (SHEAR,) or stress_measure.name != "cauchy":
@@ -346,7 +361,7 @@ def read_rows(
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(
         mode=mode,
-        stretch=as_columns(used.stretch[: len(mode.controls)]),
+        stretch=points_of(mode, used),
         stress=as_columns(used.stress),
         standard_error=as_columns(used.standard_error),
         name=Path(path).stem if name is None else name,
@@ -358,5 +373,16 @@ def read_rows(
     about_loads = filter(None, (load.note for load in loads))
     notes = *table.notes, *problems, *about_loads
     return Reading(
-        experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads, doubts
+        experiment,
+        table,
+        choices,
+        recorded,
+        used,
+        tuple(cycles),
+        notes,
+        tested,
+        mode_source,
+        spreads,
+        doubts,
+        axial_column,
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from tissuq.experiments.numbers import wrapped
 from tissuq.experiments.reading.assumptions import is_doubtful
+from tissuq.experiments.reading.axial_stretch import stretches_held
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
@@ -104,7 +105,8 @@ class Inspection:
         labels_of_spans, stretches, stresses = zip(*self._spans(), strict=True)
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
-        yield "stretch", f"{'; '.join(labelled(labels_of_spans, stretches))}{again}"
+        held = "" if used.axial_stretch is None else f" (hoop), axial stretch {stretches_held(used.axial_stretch)}"
+        yield "stretch", f"{'; '.join(labelled(labels_of_spans, stretches))}{held}{again}"
         yield "stress", f"{'; '.join(labelled(labels_of_spans, stresses))} (engineering stress, tension positive)"
         if used.standard_error.any():
             pairs = zip(used.standard_error, used.stress, strict=True)
@@ -136,6 +138,8 @@ class Inspection:
             roles[choice.deformation] = (
                 _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
             )
+        if self.reading.axial_column is not None:
+            roles[self.reading.axial_column] = "axial stretch"
         for column in range(len(table.names)):
             if self.reading.mode_source == f"column {table.label(column)}":
                 roles[column] = "loading mode"
@@ -155,7 +159,7 @@ class Inspection:
 
     def _cycle_table(self) -> Iterator[str]:
         cycles, stretch = self.reading.cycles, self.reading.recorded.course
-        mean = "mean " * (len(self.reading.experiment.mode.controls) > 1)
+        mean = "mean " * (len(self.reading.used.stretch) > 1)
         yield f"{f'cycle     {self.reading.table.counted}s':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
         for number, cycle in list(enumerate(cycles, start=1))[:MAX_CYCLES_SHOWN]:
             rows = cycle.rows()

@@ -97,9 +97,7 @@ def stress_of(
         tube, _ = dimensions.tube
         source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
         scale = factor / tube.log_ratio
-        return Load(
-            values * scale, _unit_shown(options), source, scale=scale, measure=measure_of_tube(tube), note=tube.note
-        )
+        return Load(values * scale, _unit_shown(options), source, scale=scale, measure=measure_of_tube(tube))
     if choice.load == "force":
         if choice.stress_type != "engineering":
             raise InputError(

@@ -74,6 +74,8 @@ class MeasuredRows:
     steps : tuple of str
         What was done so far.
     dropped : tuple of Dropped
+    axial_stretch : (n,) array, optional
+        That at which a tube is held, where the loading mode has it beside the hoop stretch.
     """
 
     table: Table
@@ -84,6 +86,7 @@ class MeasuredRows:
     labels: tuple[str, ...] = ("",)
     steps: tuple[str, ...] = ()
     dropped: tuple[Dropped, ...] = ()
+    axial_stretch: Column | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -110,7 +113,8 @@ class MeasuredRows:
         if len(rows) == len(self):
             return self
         columns = {name: getattr(self, name)[:, rows] for name in ("stretch", "stress", "standard_error")}
-        return replace(self, table=self.table.taken(rows), rows=self.rows[rows], **columns)
+        axial_stretch = None if self.axial_stretch is None else self.axial_stretch[rows]
+        return replace(self, table=self.table.taken(rows), rows=self.rows[rows], axial_stretch=axial_stretch, **columns)
 
     def kept(self, rows: NDArray[np.intp], reason: str) -> MeasuredRows:
         """Return some of the rows, the others dropped for a reason."""

@@ -218,13 +218,20 @@ STRESS_MEASURES = {
 volume), and 2 T / (pi R^3) of the torque T of a disc with the radius R."""
 
 
+def _from_mean_in_wall(tube: Tube, points: FloatArray, mean: FloatArray) -> FloatArray:
+    if points.ndim == 1:
+        return tube.engineering_stress(points, mean)
+    hoop, axial = np.moveaxis(points, -1, 0)
+    return tube.engineering_stress(hoop, mean, axial)
+
+
 def measure_of_tube(tube: Tube) -> StressMeasure:
     """Return the measure of mean stresses p / ln(B/A) of a tube's wall."""
     return StressMeasure(
         name="inflation",
         words="",
-        engineering=lambda mode, points, stress: tube.engineering_stress(points, stress[0])[None],
-        step="mean stress of the wall times the hoop stretch, and times the stress in its middle over the mean, to "
-        "engineering stress",
+        engineering=lambda mode, points, stress: _from_mean_in_wall(tube, points, stress[0])[None],
+        step="mean stress of the wall times the hoop stretch (and the axial stretch, where that is not 1), and times "
+        "the stress in its middle over the mean, to engineering stress",
         is_of_file=True,
     )

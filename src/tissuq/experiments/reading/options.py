@@ -9,7 +9,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.modes import InflatedTube, LoadingMode, loading_mode
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
@@ -41,6 +41,7 @@ class ReadingOptions(TypedDict, total=False):
     zero: str | None
     mean_of: int | None
     dimensions: Mapping[str, str] | None
+    axial_stretch: float | None
     only: Mapping[str, str | int] | None
     compression_positive: bool | None
     turn: str | None
@@ -172,7 +173,8 @@ def checked_mode(mode_or_name: str | LoadingMode, options: ReadingOptions) -> Lo
     """Return a loading mode, once the options have been looked at that need no file."""
     mode = loading_mode(mode_or_name)
     step = options.get("every", 1)
-    if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
+    is_tube = isinstance(mode, InflatedTube)
+    if len(mode.stresses) > 2 or (len(mode.controls) > len(mode.stresses) and not is_tube):
         raise InputError(
             f"a file is read in loading modes with one stress or two, and '{mode.name}' has "
             f"{', '.join(mode.stresses)}: give its values to Experiment."
@@ -198,6 +200,11 @@ def checked_mode(mode_or_name: str | LoadingMode, options: ReadingOptions) -> Lo
         raise InputError(
             f"preload (--preload) does not go with loading mode '{mode.name}', where it does not say which stress "
             "carries it. Leave it out, and count stretches in the file from where the specimen is taut."
+        )
+    if is_tube and options.get("preload") is not None:
+        raise InputError(
+            f"preload (--preload) does not go with loading mode '{mode.name}', whose hoop stretch is that of the tube "
+            "when it is neither stretched nor inflated. Leave rows out with --stretch or --leave-out."
         )
     stretch_range = options.get("stretch_range")
     ends = np.asarray([0.0, 1.0] if stretch_range is None else stretch_range)

@@ -6,10 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode, Planar
+from tissuq.experiments.modes import InflatedTube, LoadingMode, Planar
 from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
@@ -20,6 +18,7 @@ __all__ = [
     "DEFORMATIONS",
     "DEFORMATIONS_OF_UNITS",
     "DIAMETERS",
+    "HOW_TO_READ_TUBE",
     "LENGTHENINGS",
     "LOADS",
     "OTHER_MEASURE",
@@ -58,13 +57,11 @@ NEITHER_LOAD_NOR_DEFORMATION = re.compile(
 
 HOW_TO_READ_TUBE = (
     'If it was held at its undeformed length, give --mode planar --diameter "3 mm" --thickness "0.5 mm": its '
-    "undeformed outer diameter and the thickness of its wall. If it was stretched along its axis, too, convert "
-    "pressure and force with ThinTube.engineering_stresses in Python, and give these stresses with --mode thin-tube."
+    "undeformed outer diameter and the thickness of its wall. If it was stretched along its axis first, give these and "
+    "--mode inflated-tube --axial-stretch 1.5, where the file has no column of it. Where the axial force was measured, "
+    "too, ThinTube.engineering_stresses in Python makes both stresses of --mode thin-tube."
 )
 """How a tube is read."""
-AXIAL_STRETCH = re.compile(r"(axial|longitudinal|z) (stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?z")
-SAME_LENGTH = 0.01
-"""Axial stretch, less one, up to which a tube counts as held at its undeformed length."""
 
 
 @dataclass(frozen=True)
@@ -305,11 +302,10 @@ def with_columns_of_tube(
             raise InputError(
                 f"{table.file}: {fault} the {role.replace('_', ' ')} of a tube. Say which it is: --column {role}=NAME."
             )
-    if not isinstance(mode, Planar):
+    if not isinstance(mode, Planar | InflatedTube):
         names = " and ".join(table.label(by_role[role][0]) for role in (PRESSURE, diameter) if role in by_role)
         advice = "" if tube_roles else " To read other columns, say which: --column stretch=NAME --column force=NAME."
         raise InputError(f"{table.file} is of a tube under pressure ({names}). {HOW_TO_READ_TUBE}{advice}")
-    _check_length_of_tube(table)
     return {role: mapping.get(role, by_role.get(role, [0])[0] + 1) for role in (PRESSURE, diameter)}
 
 
@@ -321,17 +317,3 @@ def _columns_of_tube(table: Table, quantities: Sequence[str], role: str) -> Iter
         is_one = quantity in names if is_named or role != PRESSURE else measured_in(table.unit(column)) == PRESSURE
         if is_one and not table.is_constant(column):
             yield column
-
-
-def _check_length_of_tube(table: Table) -> None:
-    """Refuse a tube whose axial stretch the table says, and that is not one."""
-    for column, quantity in enumerate(table.quantities):
-        if not AXIAL_STRETCH.fullmatch(quantity):
-            continue
-        (stretch,) = table.numbers([column])
-        row = int(np.argmax(np.abs(stretch - 1)))
-        if abs(stretch[row] - 1) > SAME_LENGTH:
-            raise InputError(
-                f"{table.place(column, row)}: the axial stretch is {stretch[row]:g}, and in loading mode 'planar' a "
-                f"tube keeps its undeformed length. {HOW_TO_READ_TUBE}"
-            )

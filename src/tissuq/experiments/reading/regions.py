@@ -74,7 +74,7 @@ class TestedStress:
     @property
     def control(self) -> Control:
         """What the course is of: the mode's control, or the mean stretch where there are several."""
-        return self.mode.controls[0] if len(self.mode.controls) == 1 else STRETCH
+        return self.mode.controls[0] if 1 in (len(self.mode.controls), len(self.mode.stresses)) else STRETCH
 
     @cached_property
     def peak(self) -> int:
@@ -134,7 +134,12 @@ class TestedStress:
 
     @cached_property
     def slack(self) -> Slack | None:
-        """The slack at the beginning of the first loading, from the rows before it is disturbed."""
+        """The slack at the beginning of the first loading, from the rows before it is disturbed.
+
+        None of a tube that was stretched first, which is free of stress at no stretch of its own.
+        """
+        if self.used.axial_stretch is not None:
+            return None
         end = min(event.start for event in (self.rupture, *self.slips, Event(len(self.stress), 0, 0.0)) if event)
         rows = self.branches[0]
         rows = rows[rows < end]

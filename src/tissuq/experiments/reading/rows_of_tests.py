@@ -13,10 +13,10 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, is_of_specimens, plain
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice
 from tissuq.experiments.reading.stated_mode import modes_in_column
 from tissuq.experiments.reading.table import Column, Table, filled_on
-from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
+from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, CYCLE_NAMES, SET_NAMES
 
 __all__ = [
     "LABELS",
@@ -163,6 +163,8 @@ def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], cour
 def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
     """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
+    if choices[0].load == PRESSURE:  # a tube is inflated at several axial stretches in turn
+        used |= {column for column, name in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(name)}
     samples = list(zip(*table.some_rows(SAMPLED_ROWS).cells(), strict=True))
     for column in sorted(set(range(len(table.names))) - used):
         quantity = table.quantities[column]

@@ -8,6 +8,7 @@ from unicodedata import normalize
 from tissuq.experiments.units import measured_in
 
 __all__ = [
+    "AXIAL_STRETCH",
     "COUNT_NAMES",
     "CYCLE_NAMES",
     "DEFORMATION_NOUNS",
@@ -19,6 +20,7 @@ __all__ = [
     "OPEN_WITHOUT_UNIT",
     "ROLES",
     "ROLES_OF_TUBE",
+    "ROLE_OF_AXIAL_STRETCH",
     "SET_NAMES",
     "SPECIMEN_NAME",
     "SPREADS",
@@ -191,6 +193,18 @@ ROLES = {
 
 
 ROLES_OF_TUBE = ("outer_diameter", "inner_diameter", "pressure")
+
+
+ROLE_OF_AXIAL_STRETCH = "axial_stretch"
+"""Of a column beside these."""
+
+
+AXIAL_STRETCH = re.compile(
+    r"(axial|longitudinal|z) (stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?(z|axial)|in ?vivo stretch|"
+    r"(axiale|longitudinale) (dehnung|streckung)|[ée]tirement (axial|longitudinal)|estiramiento (axial|longitudinal)|"
+    r"轴向拉伸比?|осевая степень растяжения"
+)
+"""Names of a column that is one where there are columns of a tube, too."""
 
 
 NOUNS = {
