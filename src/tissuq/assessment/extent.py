@@ -76,7 +76,7 @@ class Assessment:
         intervals that drop the discrepancy for that reason miss the parameter where the noise hides a small one.
     width_against_none : float or None
         Standard deviation of the parameter over that without discrepancy; like the former None where there is none to
-        compare with, or it would have to be sampled.
+        compare with.
     scales : tuple of str
         The parameters that set the size of the discrepancy's random part.
     shifts : dict of float to float
@@ -221,7 +221,6 @@ def assess(
     solution: Solution,
     solve: Solve,
     ranges: Mapping[str, StableRange],
-    needs_sampler: Callable[[StatisticalModel], bool],
 ) -> Assessment:
     """Return the effect of the discrepancy on a posterior.
 
@@ -233,14 +232,10 @@ def assess(
         with other prior scales of the discrepancy.
     ranges : mapping of str to StableRange
         Stable range by loading mode.
-    needs_sampler : callable
-        Says of a model whether ``solve`` samples it. The one without discrepancy is left out where a posterior that was
-        not sampled would have to be compared with one that is, which takes far longer than itself.
     """
     model, marginal = solution.model, solution.marginals[solution.model.headline]
     nothing = _without(model)
-    is_slow = solution.diagnostics is None and nothing is not None and needs_sampler(nothing)
-    none = None if nothing is None or is_slow else _solved(nothing, solve)
+    none = None if nothing is None else _solved(nothing, solve)
     share, initial_share = shares_of_discrepancy(solution)
     stiffness = modulus(solution)
     scales = scale_symbols(model)

@@ -180,7 +180,7 @@ class Posterior(PosteriorPlots):
 
     @cached_property
     def _assessment(self) -> Assessment:
-        return assess(self.solution, self.solver.solve, self.stable_ranges, self.solver.needs_sampler)
+        return assess(self.solution, self.solver.solve, self.stable_ranges)
 
     def stability(
         self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41

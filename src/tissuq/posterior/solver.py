@@ -71,11 +71,6 @@ class Solver:
         """Return whether there is an evidence without sampling."""
         return self.method in ("auto", "exact") and (_is_on_lattices(model) or not AdaptiveCells().why_not(model))
 
-    def needs_sampler(self, model: StatisticalModel) -> bool:
-        """Return whether a model is sampled."""
-        is_slow = self.method == "auto" and not _is_on_lattices(model) and bool(_why_not_soon(model))
-        return is_slow or not self._is_integrated(model)
-
     def _sums_noise(self, model: StatisticalModel) -> bool:
         """Return whether a model is solved as a sum over values of its noise."""
         return self._is_integrated(model) and not NoiseGrid.why_not(model)
