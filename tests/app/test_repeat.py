@@ -22,7 +22,7 @@ EVERY_OPTION = {
     "compression_positive": True, "turn": "load", "load_zero": "0.02 N", "cycle": "last", "branch": "loading",
     "compliance": "0.5 um/N", "leave_out": "31,45:50", "preload": "auto", "stretch_range": [1.0, 1.25],
     "until_peak": True, "relaxed": True, "incompressible": True, "every": 2, "axis": "x", "sheet": "2", "table": 1,
-    "skip_rows": 3,
+    "skip_rows": 3, "axial_stretch": 1.5,
 }  # fmt: skip
 
 
