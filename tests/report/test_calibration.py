@@ -18,18 +18,32 @@ DEPTH = np.linspace(0.1, 1, 10)
 PINNED = PinnedProcess(references=(0.0,))
 
 
-def study(discrepancy=PINNED, *, half_widths=(0.1, 0.05), share=0.0, alone=1.0, inside=1.0, warnings=(), is_sure=True):
+def study(
+    discrepancy=PINNED,
+    *,
+    half_widths=(0.1, 0.05),
+    share=0.0,
+    alone=1.0,
+    of_band=0.02,
+    inside=1.0,
+    warnings=(),
+    is_sure=True,
+):
     """Return a calibration of mu = 2 and b = 3 whose intervals have these half widths over the mean."""
     means = dict(zip(("mu", "b"), (2.0, 3.0), strict=True))
     marginals = {
         symbol: SimpleNamespace(mean=mean, hdi=lambda mean=mean, half=half: (mean * (1 - half), mean * (1 + half)))
         for (symbol, mean), half in zip(means.items(), half_widths, strict=True)
     }
-    band = pd.DataFrame({"control": DEPTH, "mean": DEPTH, "low": 0.98 * DEPTH, "high": 1.02 * DEPTH})
+    bands = [
+        pd.DataFrame({"control": DEPTH, "mean": DEPTH, "low": (1 - half) * DEPTH, "high": (1 + half) * DEPTH})
+        for half in (of_band, 0.02)
+    ]
     problem = SimpleNamespace(forward_symbols=("mu", "b"), discrepancy=discrepancy, quantities={"": (0, len(DEPTH))})
     calibration = SimpleNamespace(
         problem=problem, marginals=marginals, converged=is_sure, emulator_share={"mu": share, "b": 0.0},
-        predict=lambda noise: band, predictive_coverage=lambda discrepancy=True: inside if discrepancy else alone,
+        predict=lambda noise, discrepancy: bands[discrepancy],
+        predictive_coverage=lambda discrepancy=True: inside if discrepancy else alone,
     )  # fmt: skip
     measured = SimpleNamespace(control=DEPTH)
     return SimpleNamespace(
@@ -53,6 +67,8 @@ EMULATOR = ResultWarning("the emulator is over-confident.", "inaccurate-emulator
         ({"discrepancy": NoDiscrepancy()}, (CARE, YES, CARE), "if the model is right", "let the forward model"),
         ({"discrepancy": GaussianProcess()}, (NO, YES, NO), "takes initial stiffness", "let the forward model"),
         ({"alone": 0.4}, (YES, YES, NO), "mu known to ± 10 %", "calibrate a model that comes nearer"),
+        ({"of_band": 0.3}, (YES, YES, CARE), "mu known to ± 10 %", "name the law"),
+        ({"of_band": 0.6}, (YES, YES, NO), "mu known to ± 10 %", "let another test narrow the parameters"),
         ({"share": 0.2}, (CARE, YES, YES), "up to 20 % of the variance", "make the emulator"),
         ({"share": 0.7}, (NO, YES, NO), "the error of the emulator makes up to 70 %", "make the emulator"),
         ({"warnings": [EMULATOR]}, (CARE, YES, YES), "see the warning about the emulator", "name the law"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from tissuq.assessment.uses import MIN_INSIDE, Use, Verdict, precision_of, relative_half_width, worst_of
+from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.model.discrepancy import GaussianProcess, NoDiscrepancy, PinnedProcess
@@ -118,14 +119,18 @@ def _predicting(study: CalibrationStudy) -> tuple[Verdict, str]:
     counts = f"{100 * inside:.0f} % of the measurements inside the band"
     if inside < MIN_INSIDE or has_code(study.warnings, "unmodelled-curve"):
         return Verdict.NO, f"only {counts}" if inside < MIN_INSIDE else "the model does not give the measurements"
-    table = calibration.predict(noise=False)
+    verdict, width = precision_of(_half_width(calibration, discrepancy=True))
+    return verdict, f"{width} on average where it was measured; {counts}"
+
+
+def _half_width(calibration: Calibration, *, discrepancy: bool) -> float:
+    """Return the half width of the band over its middle where it was measured, of the quantity with the widest one."""
+    table = calibration.predict(noise=False, discrepancy=discrepancy)
     control, *ends = (table[name].to_numpy() for name in ("control", "mean", "low", "high"))
-    widths = [
+    return max(
         relative_half_width(Band(control[start:stop], *(end[start:stop] for end in ends)))
         for start, stop in calibration.problem.quantities.values()
-    ]
-    verdict, width = precision_of(max(widths))
-    return verdict, f"{width} on average where it was measured; {counts}"
+    )
 
 
 def _of_model_alone(use: Use, study: CalibrationStudy) -> Use:
@@ -138,7 +143,10 @@ def _of_model_alone(use: Use, study: CalibrationStudy) -> Use:
     counts = f"{100 * inside:.0f} % of the measurements inside the band of the model alone"
     if inside < MIN_INSIDE:
         return use._replace(verdict=Verdict.NO, reason=f"only {counts}, and its discrepancy is of this experiment")
-    return use._replace(reason=use.reason or counts)
+    if use.reason:
+        return use
+    verdict, width = precision_of(_half_width(calibration, discrepancy=False))
+    return use._replace(verdict=verdict, reason=f"the model alone is {width} where it was measured; {counts}")
 
 
 def finding_of(study: CalibrationStudy) -> str:
@@ -174,6 +182,8 @@ def next_step_of(study: CalibrationStudy) -> str:
         return "calibrate a model that comes nearer to the measurements, such as one with another law."
     if study.posterior is not None:
         return "take the material further: tissuq predict {run} (export and structure take the run, too)"
+    if uses_of_calibration(study)[-1].verdict is Verdict.NO:
+        return "let another test narrow the parameters: repeat the command with --prior-run RUN or narrower priors."
     return (
         "name the law of the model and the stretches in it: repeat the command with --material LAW --range LOW:HIGH "
         "--force; predict, export and structure then take the run."
