@@ -10,8 +10,6 @@ from scipy.stats import halfcauchy
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
-from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.outer_search import relative_error
 from tissuq.inference.linear import times_gaussians
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points, log_normal
@@ -142,30 +140,6 @@ def test_energies_take_materials_with_exponents(discrepancy, material):
     assert modulus.std() < 0.1
     assert posterior.predictive_coverage() > 0.8
     assert "effective" in posterior.solution.reason
-
-
-@pytest.mark.parametrize("noise_sd", [NOISE_SD, "unknown"])
-def test_without_a_discrepancy_sums_over_exponents_agree_with_quadrature(noise_sd):
-    model = tq.fit(
-        DATA, material="ogden-2", discrepancy="none", noise_sd=noise_sd, tolerances="as-tested"
-    ).solution.model
-    (truth,), (summed,) = AdaptiveCells().solve([model]), AmplitudeLattice().solve([model])
-    assert summed.members == {}
-    assert summed.mixture.member is None
-    assert summed.log_evidence == pytest.approx(truth.log_evidence, abs=3 * summed.log_evidence_error)
-    assert summed.log_evidence_error < 0.15
-    for symbol in model.symbols:
-        reference, marginal = truth.marginals[symbol], summed.marginals[symbol]
-        assert marginal.mean == pytest.approx(reference.mean, abs=0.25 * reference.sd)
-        assert marginal.sd == pytest.approx(reference.sd, rel=0.2)
-
-
-@pytest.mark.slow
-def test_without_a_discrepancy_three_exponents_need_no_sampling():
-    posterior = tq.fit(DATA, material="ogden-3", discrepancy="none")
-    assert posterior.solution.route == "exact"
-    assert posterior.solution.log_evidence_error < 0.2
-    assert "alpha1, alpha2, alpha3" in posterior.solution.reason
 
 
 def test_a_narrow_and_skewed_density_is_found():

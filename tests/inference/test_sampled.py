@@ -132,7 +132,7 @@ def test_the_joint_method_gives_no_evidence_and_says_how_it_converged():
     assert "onverged" in posterior.solution.diagnostics.verdict
 
 
-def test_four_nonlinear_parameters_go_to_nuts_on_auto(paper, monkeypatch):
+def test_what_no_sum_takes_goes_to_nuts_on_auto(paper, monkeypatch):
     class Asked(Exception):
         pass
 
@@ -140,18 +140,21 @@ def test_four_nonlinear_parameters_go_to_nuts_on_auto(paper, monkeypatch):
         raise Asked(refusal)
 
     monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_by_nuts", asked)
-    with pytest.raises(Asked, match="at most 3 nonlinear parameters"):
-        tq.fit(paper.experiment(), discrepancy="gp", priors={"C10": tq.LogNormal(1.0, 1.0)})
+    with pytest.raises(Asked, match="not independent along any fixed directions"):
+        tq.fit(paper.experiment(), discrepancy="gp", noise="proportional")
 
 
 @pytest.mark.slow
-def test_four_nonlinear_parameters_are_sampled_on_auto(paper):
+def test_four_nonlinear_parameters_are_sampled_as_they_are_summed(paper):
     priors = {"C10": tq.LogNormal(1.0, 1.0)}
-    posterior = tq.fit(paper.experiment(), discrepancy="gp", priors=priors)
-    assert posterior.solution.route == "nuts"
-    assert "at most 3 nonlinear parameters" in posterior.solution.reason
-    assert np.isfinite(posterior.log_evidence)
-    assert posterior.log_evidence_error > 0
+    summed, sampled = (
+        tq.fit(paper.experiment(), discrepancy="gp", priors=priors, method=method) for method in ("auto", "nuts")
+    )
+    assert (summed.solution.route, sampled.solution.route) == ("exact", "nuts")
+    for symbol in summed.model.symbols:
+        a, b = (posterior.solution.marginals[symbol] for posterior in (summed, sampled))
+        assert b.mean == pytest.approx(a.mean, abs=0.25 * a.sd)
+        assert b.sd == pytest.approx(a.sd, rel=0.25)
 
 
 def test_a_dense_covariance_that_is_too_large_is_refused():

@@ -16,7 +16,7 @@ from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.rays import Range
 from tissuq.model.compatibility import check_angles, check_linearity, check_parts, check_separable
-from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member, NoDiscrepancy
+from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
 from tissuq.model.discrepancy.blocks import EnergyBlock
 from tissuq.model.error_model import ErrorModel
 from tissuq.model.noise import Noise, noise_named
@@ -144,12 +144,7 @@ class StatisticalModel(ErrorModel):
 
     @cached_property
     def energy_members(self) -> tuple[Member, ...]:
-        """The members of an energy discrepancy over the range of the data; none for other discrepancies.
-
-        Without any discrepancy, the one that has no blocks.
-        """
-        if isinstance(self.discrepancy, NoDiscrepancy):
-            return (Member((), (), (), (), 1.0),)
+        """The members of an energy discrepancy over the range of the data; none for other discrepancies."""
         if not isinstance(self.discrepancy, EnergyDiscrepancy):
             return ()
         return _remembered_members(self.discrepancy, self._range)

@@ -9,6 +9,7 @@ from typing import Literal
 
 from tissuq.assessment.stable_posterior import stable_part
 from tissuq.errors import ConvergenceError, ModelError
+from tissuq.inference.enumerators.adapted_points import AdaptedPoints
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
@@ -24,7 +25,7 @@ Method = Literal["auto", "exact", "nuts", "smc", "joint"]
 MAX_COMPONENTS_OF_VALUE = 1000
 """Components that represent the posterior at one value of the noise, where it is summed over several."""
 FACTORISED = 3
-"""Parameters of the structure from which `auto` samples."""
+"""Parameters from which cells would take minutes, as each of them costs a factorisation to vary."""
 METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
 
 
@@ -69,7 +70,8 @@ class Solver:
 
     def _is_integrated(self, model: StatisticalModel) -> bool:
         """Return whether there is an evidence without sampling."""
-        return self.method in ("auto", "exact") and (_is_on_lattices(model) or not AdaptiveCells().why_not(model))
+        is_summed = bool(model.energy_symbols) or not AdaptedPoints().why_not(model)
+        return self.method in ("auto", "exact") and is_summed
 
     def _sums_noise(self, model: StatisticalModel) -> bool:
         """Return whether a model is solved as a sum over values of its noise."""
@@ -94,12 +96,14 @@ class Solver:
 
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
-        lattice = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy))
+        lattice, points = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy)), AdaptedPoints(accuracy)
         are_checked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
-            if _is_on_lattices(model):
+            if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
+            if not _suits_cells(model):
+                return points.solve([model], self.seed)[0]
             return self._solve([model], AdaptiveCells(next(are_checked, False), accuracy.tolerance))[0]
 
         return solve_known
@@ -114,17 +118,16 @@ class Solver:
         """
         if self._sums_noise(model):
             return NoiseGrid(self._known_solver)
-        if _is_on_lattices(model) and self.method in ("auto", "exact"):
+        if self.method not in ("auto", "exact"):
+            sampler = _sampler(self.method)
+            if reason := sampler.why_not(model):
+                raise ModelError(f"the method '{self.method}' does not apply: {reason}.")
+            return sampler
+        if model.energy_symbols:
             return AmplitudeLattice()
-        if self.method == "auto":
-            refusal = AdaptiveCells().why_not(model) or _why_not_soon(model)
-            return _sampler("nuts", refusal) if refusal else AdaptiveCells()
-        if self.method == "exact":
-            return AdaptiveCells()
-        sampler = _sampler(self.method)
-        if reason := sampler.why_not(model):
-            raise ModelError(f"the method '{self.method}' does not apply: {reason}.")
-        return sampler
+        if (refusal := AdaptedPoints().why_not(model)) and self.method == "auto":
+            return _sampler("nuts", refusal)
+        return AdaptiveCells() if refusal or _suits_cells(model) else AdaptedPoints()
 
 
 def _sampler(method: Method, refusal: str = "") -> Enumerator:
@@ -134,15 +137,6 @@ def _sampler(method: Method, refusal: str = "") -> Enumerator:
     return {"nuts": Nuts(refusal), "smc": TemperedSmc(), "joint": JointNuts()}[method]
 
 
-def _is_on_lattices(model: StatisticalModel) -> bool:
-    """Return whether lattices serve: of an energy discrepancy, or without one where cells would not do, or not soon."""
-    return bool(
-        model.energy_symbols or (model.energy_members and (AdaptiveCells().why_not(model) or _why_not_soon(model)))
-    )
-
-
-def _why_not_soon(model: StatisticalModel) -> str:
-    """Return why the exact route, which applies, would take minutes; or nothing."""
-    if len(model.structure) < FACTORISED:
-        return ""
-    return f"each of {', '.join(model.structure)} costs a factorisation to vary, which would take minutes"
+def _suits_cells(model: StatisticalModel) -> bool:
+    """Return whether cells serve a model without energies: few nonlinear parameters, which cost little to vary."""
+    return len(model.structure) < FACTORISED and not AdaptiveCells().why_not(model)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.quasi_monte_carlo import even_points
 from tissuq.mechanics.rays import Range, drawn_back, share_to_end
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import STRETCH_STEP, drawn_stress, stress_moments, stress_slopes, stresses_beyond
@@ -85,10 +84,11 @@ class Stress:
     def _drawn(self) -> tuple[GaussianMixture, FloatArray]:
         """Several draws of every component, and probabilities of the errors of their exponents."""
         from scipy.special import ndtri
+        from scipy.stats import qmc
 
         count, scores = len(self.components), self.components.root.shape[2]
         copies = -(-MIN_DRAWS // count)
-        uniform = even_points(scores + 1, count * copies)
+        uniform = qmc.Sobol(scores + 1, rng=0).random_base2((count * copies - 1).bit_length())[: count * copies]
         weights, settings, mean = (
             np.repeat(array, copies, axis=0)
             for array in (self.components.weights / copies, self.components.settings, self.components.mean)

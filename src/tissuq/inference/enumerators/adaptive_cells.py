@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, ModelError
+from tissuq.inference.enumerators.adapted_points import AdaptedPoints
 from tissuq.inference.enumerators.line import FINE
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
@@ -69,11 +70,8 @@ class AdaptiveCells:
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""
-        if not model.has_directions:
-            return (
-                f"noise '{model.noise.name}' and discrepancy '{model.discrepancy.name}' are not independent along any "
-                "fixed directions"
-            )
+        if reason := AdaptedPoints().why_not(model):
+            return reason
         if len(model.nonlinear) > MAX_DIMENSION:
             return (
                 f"it integrates at most {MAX_DIMENSION} nonlinear parameters, and this model has "

@@ -80,14 +80,14 @@ class AmplitudeLattice:
     guide: Guide = field(default_factory=Guide)
 
     def why_not(self, model: StatisticalModel) -> str:
-        """Return why an energy discrepancy, or none, cannot be integrated with the rest of a model; else nothing."""
+        """Return why an energy discrepancy cannot be integrated with the rest of a model; nothing where it can."""
         for symbol in model.energy_symbols:
             if _lattice_error(model.priors[symbol]) > MAX_PRIOR_MASS_ERROR:
                 return (
                     f"the prior {model.priors[symbol]} of {symbol} has a bound or is narrow, where a wide positive one "
                     "is"
                 )
-        return "" if model.energy_members else f"discrepancy '{model.discrepancy.name}' is no energy"
+        return "" if model.energy_symbols else f"discrepancy '{model.discrepancy.name}' is no energy"
 
     def solve(self, models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
         """Return posterior and evidence of models with an energy discrepancy, on the same stretches.
@@ -162,7 +162,7 @@ class _EnergySums:
         error: float,
         bounded_points: int,
     ) -> None:
-        self.model, self._nodes, self._has_energy = model, nodes, bool(model.energy_symbols)
+        self.model, self._nodes = model, nodes
         self._outer = Outer(model)
         self._step = LOG_RATIO_STEP if len(nodes) == 1 else OUTER_STEP
         points = Points.joined([node.points for node in nodes])
@@ -211,7 +211,7 @@ class _EnergySums:
             seed,
             log_evidence=log_evidence,
             log_evidence_error=error,
-            members=shares_of_members(self.model, self._points.lattice, self._weights) if self._has_energy else {},
+            members=shares_of_members(self.model, self._points.lattice, self._weights),
             represent_few=lambda few, wide: self._represented(TAILS_POWER if wide else 1.0, components, few),
         )
 
@@ -219,12 +219,10 @@ class _EnergySums:
         """Return what was done."""
         model, outer = self.model, self._outer.symbols
         inner = ", ".join(symbol for symbol in model.nonlinear if symbol not in outer)
-        done = f"{', '.join(model.linear)} integrated in closed form; sums over lattices of {inner}"
-        if self._has_energy:
-            done = (
-                f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
-                f"{len(model.energy_members)} energies and lattices of {inner}"
-            )
+        done = (
+            f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
+            f"{len(model.energy_members)} energies and lattices of {inner}"
+        )
         shares = np.bincount(self._node, self._weights, minlength=len(self._nodes))
         effective = 1 / (shares @ shares)
         return done + (
@@ -267,8 +265,7 @@ class _EnergySums:
                 linear_mean, linear_root, _ = self._priors.times(linear_mean, linear_root)
                 q = linear_mean.shape[1]
                 mean[of_member, :q], root[of_member, :q, :q] = linear_mean, linear_root
-        member = points.lattice if self._has_energy else None
-        mixture = GaussianMixture(weights, self._settings(points, node), mean, root, member)
+        mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
         return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components(few)

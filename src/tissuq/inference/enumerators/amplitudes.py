@@ -78,6 +78,11 @@ class Points:
     def __getitem__(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
         return Points(*(array[index] for array in vars(self).values()))
 
+    @property
+    def log_mass(self) -> FloatArray:
+        """The logarithm of what points hold, no less than their mass within the bounds (M,)."""
+        return self.log_weight + self.log_inside
+
     @classmethod
     def joined(cls, point_sets: Sequence[Points]) -> Points:
         """Return all points of several sets."""
@@ -219,7 +224,7 @@ class Weighing:
         for share in np.linspace(0, 1, NOISE_TRIALS)[1:] if rise.max() > HARDLY_PULLED_RISE else ():
             noise_sd = np.clip(most_likely_noise * np.exp(share * rise), *likely)
             candidates.append(self._weighed(member, second_index, first_index, noise_sd))
-        best = np.argmax([points.log_weight + points.log_inside for points in candidates], axis=0)
+        best = np.argmax([points.log_mass for points in candidates], axis=0)
         arrays = zip(*(vars(points).values() for points in candidates), strict=True)
         return Points(*(np.stack(values)[best, np.arange(len(best))] for values in arrays))
 
@@ -385,7 +390,7 @@ def _rise(points: Points) -> FloatArray:
 
 def _masses(point_sets: Sequence[Points]) -> list[FloatArray]:
     """Return the masses of the points of several sets, within bounds at most, over the largest of all."""
-    logs = [points.log_weight + points.log_inside for points in point_sets]
+    logs = [points.log_mass for points in point_sets]
     top = max(log_masses.max(initial=-np.inf) for log_masses in logs)
     return [np.exp(log_masses - top) for log_masses in logs]
 

@@ -62,8 +62,8 @@ class Node:
 
     @property
     def log_mass(self) -> float:
-        """The logarithm of the points' sum."""
-        return float(np.logaddexp.reduce(self.points.log_weight))
+        """The logarithm of the points' sum, with what bounds leave of each where they cut deep."""
+        return float(np.logaddexp.reduce(self.points.log_mass))
 
 
 def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
@@ -184,9 +184,9 @@ def _thinned(points: Points, count: int, offset: float) -> Points:
     """Return the points, or where these are more, so many of the same weight that stand for all."""
     if len(points.lattice) <= count:
         return points
-    total = np.logaddexp.reduce(points.log_weight)
-    representatives = points[systematic(np.exp(points.log_weight - total)[None], count, offset)[0]]
-    return replace(representatives, log_weight=np.full(count, total - np.log(count)))
+    total = np.logaddexp.reduce(points.log_mass)
+    representatives = points[systematic(np.exp(points.log_mass - total)[None], count, offset)[0]]
+    return replace(representatives, log_weight=total - np.log(count) - representatives.log_inside)
 
 
 def _most_noise(model: StatisticalModel) -> float:

@@ -21,8 +21,6 @@ FloatArray = NDArray[np.float64]
 
 VALUES_PER_PARAMETER = 64
 """Values taken at first for each of the parameters, and once more."""
-VALUES_OF_ONE_MEMBER = 5
-"""So many times more values are taken, and are effective, where a single member makes each of them cheap."""
 SCOUT_MEMBERS = 6
 """Members, about, whose posterior guides the search for the values."""
 GUIDED_DIVISOR = 8
@@ -64,7 +62,6 @@ class _Search:
 
     def __init__(self, sums: Sums, outer: Outer, member_count: int) -> None:
         self._sums, self._outer, self._members = sums, outer, np.arange(member_count)
-        self._multiple = VALUES_OF_ONE_MEMBER if member_count == 1 else 1
 
     def on_line(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
         """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
@@ -120,8 +117,8 @@ class _Search:
             nodes.extend(new)
             return self._log_masses(new, points)
 
-        count = self._multiple * VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
-        min_effective = self._multiple * guide.accuracy.min_effective
+        count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
+        min_effective = guide.accuracy.min_effective
         adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
         guide.proposal, nodes = adaptation.proposal, nodes[-len(adaptation.points) :]
         self._check_place(guide.proposal.mean)
@@ -134,7 +131,7 @@ class _Search:
         """Return the logarithms of the density at points (N, d), roughly: from a few of the members."""
         scouts = self._members[:: -(-len(self._members) // SCOUT_MEMBERS)]
         sums = self._sums.points(self._settings(points), scouts)
-        return np.asarray(self._bases(points) + [np.logaddexp.reduce(of_point.log_weight) for of_point in sums])
+        return np.asarray(self._bases(points) + [np.logaddexp.reduce(of_point.log_mass) for of_point in sums])
 
     def _nodes(self, points: FloatArray) -> list[Node]:
         return self._sums.nodes(self._settings(points), self._members)
@@ -152,7 +149,7 @@ class _Search:
     def _leave_out_members(self, point: FloatArray) -> None:
         """Leave out members that have next to no mass at a point (d,) in the middle of the posterior."""
         (points,) = self._sums.points(self._settings(point[None]), self._members)
-        masses = np.bincount(points.lattice, np.exp(points.log_weight - points.log_weight.max()), len(self._members))
+        masses = np.bincount(points.lattice, np.exp(points.log_mass - points.log_mass.max()), len(self._members))
         order = np.argsort(masses)
         self._members = np.sort(order[np.cumsum(masses[order]) > NEGLIGIBLE_MEMBERS * masses.sum()])
 

@@ -1,0 +1,151 @@
+"""Weighted points of an adapted proposal over any number of nonlinear parameters, the linear ones in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ConvergenceError
+from tissuq.inference.enumerators.line import FINE, Accuracy
+from tissuq.inference.enumerators.outer import MAX_SCORE
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.linear import ConditionalGaussian
+from tissuq.inference.marginal import Marginal, marginal_of_points
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal
+from tissuq.inference.solution import Marginals, Solution
+from tissuq.inference.threads import one_thread
+from tissuq.inference.truncated_mixture import TruncatedMixture
+from tissuq.model.scales import off_zero
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Flat
+
+__all__ = ["AdaptedPoints"]
+
+FloatArray = NDArray[np.float64]
+
+POINTS_PER_PARAMETER = 256
+"""Points of a round for each parameter, and once more."""
+EFFECTIVE_MULTIPLE = 20.0
+"""Effective points over those of values that each cost a sum over energies, for which `Accuracy` is made."""
+IRRELEVANT_LOG_DROP = 14.0
+"""Log density below the largest at which the mass inside the bounds need not be known exactly."""
+NEGLIGIBLE_WEIGHT = 1e-9
+"""Share of the posterior that a point must hold."""
+MAX_COMPONENTS = 3000
+"""Components, at most, that represent the posterior in draws and predictions."""
+
+
+@dataclass
+class AdaptedPoints:
+    """Importance points of more nonlinear parameters than quadrature takes.
+
+    Parameters
+    ----------
+    accuracy : Accuracy
+    proposal : Proposal, optional
+        Where the posterior of a similar model lies, with which the search begins; that of the last model afterwards.
+    """
+
+    accuracy: Accuracy = FINE
+    proposal: Proposal | None = None
+
+    def why_not(self, model: StatisticalModel) -> str:
+        """Return why it does not serve a model; nothing where it does."""
+        if model.has_directions:
+            return ""
+        return (
+            f"noise '{model.noise.name}' and discrepancy '{model.discrepancy.name}' are not independent along any "
+            "fixed directions"
+        )
+
+    def solve(self, models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+        """Return posterior and evidence of models, each by itself.
+
+        Raises
+        ------
+        ConvergenceError
+            When few of the points hold nearly everything, or the sum does not settle.
+        """
+        with one_thread():
+            return [self._solution(model, seed) for model in models]
+
+    def _solution(self, model: StatisticalModel, seed: int) -> Solution:
+        density, dimension = _Density(model), len(model.nonlinear)
+        start, min_effective = self.proposal, EFFECTIVE_MULTIPLE * self.accuracy.min_effective
+        if start is None:
+            start = adapted(density, dimension).proposal
+        count = POINTS_PER_PARAMETER * (dimension + 1)
+        adaptation = adapted(density, dimension, count, start=start, min_effective=min_effective)
+        log_weights, number = adaptation.log_weights, effective(adaptation.log_weights)
+        if not adaptation.is_settled or number < min_effective:
+            raise ConvergenceError(
+                f"the posterior of {', '.join(model.nonlinear)} was not found well enough: {number:.0f} of "
+                f"{len(log_weights)} points are effective. Give narrower priors, or use the method 'nuts'."
+            )
+        self.proposal = adaptation.proposal
+        weights = np.exp(log_weights - log_weights.max())
+        weights /= weights.sum()
+        matters = weights > NEGLIGIBLE_WEIGHT
+        weights, settings = weights[matters] / weights[matters].sum(), density.settings(adaptation.points[matters])
+        box, gaussians = density.conditional.boxes, density.conditional(settings[None])
+        mixture = GaussianMixture(weights, settings, gaussians.mean[0], gaussians.root[0])
+        truncated = TruncatedMixture.of(mixture, box.beyond(mixture.mean, mixture.root), box)
+
+        def marginal(symbol: str) -> Marginal:
+            if symbol in model.linear:
+                return truncated.marginal(model.linear.index(symbol))
+            return marginal_of_points(settings[:, model.nonlinear.index(symbol)], weights, model.priors[symbol].support)
+
+        linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
+        reason = f"{linear}; a sum over {len(weights)} points of {', '.join(model.nonlinear)} ({number:.0f} effective)"
+        solution = Solution(
+            model,
+            "exact",
+            reason,
+            lambda: truncated.components(MAX_COMPONENTS),
+            Marginals.of(model, marginal),
+            truncated.components,
+            seed,
+        )
+        if any(isinstance(prior, Flat) for prior in model.priors.values()):
+            return solution
+        error = float(np.sqrt(1 / number - 1 / len(log_weights)))
+        return replace(solution, log_evidence=adaptation.log_mass, log_evidence_error=error)
+
+
+class _Density:
+    """The log density of the nonlinear parameters of a model, in coordinates that are normal under their priors."""
+
+    def __init__(self, model: StatisticalModel) -> None:
+        self.conditional = ConditionalGaussian([model])
+        self._priors = [model.priors[symbol] for symbol in model.nonlinear]
+
+    def settings(self, points: FloatArray) -> FloatArray:
+        """Return the values (N, d) at points (N, d)."""
+        from scipy.special import ndtr
+
+        probabilities = ndtr(np.clip(points, -MAX_SCORE, MAX_SCORE)).T
+        columns = [
+            [off_zero(prior, float(p)) for p in of_prior]
+            for prior, of_prior in zip(self._priors, probabilities, strict=True)
+        ]
+        return np.array(columns).T
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return it (N,) at points (N, d)."""
+        try:
+            gaussians = self.conditional(self.settings(points)[None])
+        except (ConvergenceError, np.linalg.LinAlgError):  # where columns depend on each other, far away
+            if len(points) == 1:
+                return np.full(1, -np.inf)
+            return np.concatenate([self(half) for half in np.array_split(points, 2)])
+        mean, root = gaussians.mean[0], gaussians.root[0]
+        boxes = self.conditional.boxes.repeated(len(points))
+        likelihood = np.nan_to_num(gaussians.log_likelihood[0], nan=-np.inf) + log_normal(points)
+        values = likelihood + boxes.ceiling(mean, root)
+        near = np.flatnonzero(values > values.max() - IRRELEVANT_LOG_DROP)
+        values[near] = likelihood[near] + boxes[near].log_mass(mean[near], root[near])[0]
+        return np.asarray(values)

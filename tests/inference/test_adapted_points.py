@@ -1,0 +1,67 @@
+"""Importance points of many nonlinear parameters against quadrature of few, and where they do not serve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.errors import ConvergenceError
+from tissuq.inference.enumerators.adapted_points import AdaptedPoints
+from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
+
+STRETCH = np.linspace(0.75, 1.6, 12)
+DATA = tq.Experiment(
+    "uniaxial",
+    STRETCH,
+    2 * 0.3 * (STRETCH - STRETCH**-2) * (1 + 0.1 * (STRETCH**2 + 2 / STRETCH - 3))
+    + 0.02 * np.random.default_rng(1).standard_normal(12),
+)
+CUT = {"C10": tq.Uniform(0, 0.25), "C20": tq.Uniform(0, 1), "C30": tq.Uniform(0, 1)}
+
+
+def model(**options):
+    return tq.fit(DATA, tolerances="as-tested", **options).solution.model
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"material": "ogden-1", "discrepancy": "none"},
+        {"material": "gent", "discrepancy": "linear", "noise_sd": 0.02},
+        {"discrepancy": "gp", "noise_sd": 0.02},
+        {"discrepancy": "constant", "noise": "proportional"},
+        {"discrepancy": "yeoh", "priors": CUT},
+    ],
+    ids=["exponent", "limit", "process", "proportional", "bounds"],
+)
+def test_sums_over_points_agree_with_quadrature(options):
+    problem = model(**options)
+    (truth,), (summed,) = AdaptiveCells().solve([problem]), AdaptedPoints().solve([problem])
+    assert summed.log_evidence_error < 0.06
+    assert summed.log_evidence == pytest.approx(truth.log_evidence, abs=4 * summed.log_evidence_error)
+    for symbol in problem.symbols:
+        exact, marginal = truth.marginals[symbol], summed.marginals[symbol]
+        assert marginal.mean == pytest.approx(exact.mean, abs=0.15 * exact.sd)
+        assert marginal.sd == pytest.approx(exact.sd, rel=0.15)
+
+
+@pytest.mark.parametrize("discrepancy", ["none", "linear", pytest.param("gp", marks=pytest.mark.slow)])
+def test_three_exponents_are_summed(discrepancy):
+    posterior = tq.fit(DATA, material="ogden-3", discrepancy=discrepancy)
+    assert posterior.solution.route == "exact"
+    assert posterior.log_evidence_error < 0.1
+    assert "points of alpha1, alpha2, alpha3" in posterior.solution.reason
+
+
+def test_a_similar_posterior_is_found_from_the_last_one():
+    points, problem = AdaptedPoints(), model(material="ogden-1", discrepancy="none")
+    first, again = (points.solve([problem])[0] for _ in range(2))
+    assert points.proposal is not None
+    assert again.log_evidence == pytest.approx(first.log_evidence, abs=0.15)
+
+
+def test_points_that_are_not_effective_are_said(monkeypatch):
+    monkeypatch.setattr("tissuq.inference.enumerators.adapted_points.EFFECTIVE_MULTIPLE", 1e6)
+    with pytest.raises(ConvergenceError, match=r"posterior of alpha1, noise_sd was not found well enough: \d+ of"):
+        AdaptedPoints().solve([model(material="ogden-1", discrepancy="none")])
