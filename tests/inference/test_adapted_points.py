@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.adapted_points import AdaptedPoints
+from tissuq.inference.enumerators.adapted_points import AdaptedPoints, _Density
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 
 STRETCH = np.linspace(0.75, 1.6, 12)
@@ -64,4 +64,10 @@ def test_a_similar_posterior_is_found_from_the_last_one():
 def test_points_that_are_not_effective_are_said(monkeypatch):
     monkeypatch.setattr("tissuq.inference.enumerators.adapted_points.EFFECTIVE_MULTIPLE", 1e6)
     with pytest.raises(ConvergenceError, match=r"posterior of alpha1, noise_sd was not found well enough: \d+ of"):
+        AdaptedPoints().solve([model(material="ogden-1", discrepancy="none")])
+
+
+def test_points_that_are_all_impossible_are_said(monkeypatch):
+    monkeypatch.setattr(_Density, "__call__", lambda self, points: np.full(len(points), -np.inf))
+    with pytest.raises(ConvergenceError, match="0 of"):
         AdaptedPoints().solve([model(material="ogden-1", discrepancy="none")])

@@ -241,6 +241,8 @@ def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray
 
 
 def effective(log_weights: FloatArray) -> float:
-    """Return the effective number of weighted points."""
+    """Return the effective number of weighted points; none where no weight is more than nothing."""
+    if log_weights.max() <= LOG_OF_NOTHING:
+        return 0.0
     weights = np.exp(log_weights - log_weights.max())
     return float(weights.sum() ** 2 / (weights**2).sum())

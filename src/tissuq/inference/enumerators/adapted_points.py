@@ -112,7 +112,8 @@ class AdaptedPoints:
         )
         if any(isinstance(prior, Flat) for prior in model.priors.values()):
             return solution
-        error = float(np.sqrt(1 / number - 1 / len(log_weights)))
+        _, error_of_mass = box.repeated(len(weights)).log_mass(mixture.mean, mixture.root)
+        error = float(np.sqrt(1 / number - 1 / len(log_weights)) + weights @ error_of_mass)
         return replace(solution, log_evidence=adaptation.log_mass, log_evidence_error=error)
 
 
@@ -144,7 +145,8 @@ class _Density:
             return np.concatenate([self(half) for half in np.array_split(points, 2)])
         mean, root = gaussians.mean[0], gaussians.root[0]
         boxes = self.conditional.boxes.repeated(len(points))
-        likelihood = np.nan_to_num(gaussians.log_likelihood[0], nan=-np.inf) + log_normal(points)
+        likelihood = gaussians.log_likelihood[0] + log_normal(points)
+        likelihood = np.where(np.isnan(likelihood), -np.inf, likelihood)
         values = likelihood + boxes.ceiling(mean, root)
         near = np.flatnonzero(values > values.max() - IRRELEVANT_LOG_DROP)
         values[near] = likelihood[near] + boxes[near].log_mass(mean[near], root[near])[0]
