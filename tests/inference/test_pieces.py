@@ -109,6 +109,17 @@ def spectrum(points, psi):
     )
 
 
+def test_cut_parts_of_very_different_widths_have_a_marginal_together():
+    """A narrow part, far from most of the places at which a wide one is tabulated, made them no number."""
+    root = np.array([[[1.0, 0.0], [0.5, 0.8]], [[1e-12, 0.0], [5e-13, 8e-13]]])
+    parts = GaussianMixture(np.array([0.5, 0.5]), np.zeros((2, 0)), np.zeros((2, 2)), root)
+    touched = np.array([[False, True], [False, True]])
+    marginal = TruncatedMixture(parts, touched, boxes([-np.inf, 0.0], [np.inf, np.inf])).marginal(0)
+    assert np.isfinite(marginal.density).all()
+    assert marginal.mean == pytest.approx(0.5 * 0.5 / np.hypot(0.5, 0.8) * np.sqrt(2 / np.pi), rel=1e-6)
+    assert np.isfinite(marginal.hdi()).all()
+
+
 def test_a_part_that_bounds_cut_and_that_hardly_weighs_is_kept_without_harm():
     box = boxes([0.0, 0.0], [np.inf, np.inf])
     weights = np.array([1 - 7e-8, 7e-8])

@@ -203,9 +203,11 @@ def _marginal_of_cut(gaussians: GaussianMixture, index: int, cut_index: int, end
         low_given, high_given = ((end[:, None] - correlation * scores) / complement for end in (low, high))
         log_given = log_interval(low_given, high_given)
         log_density += log_given
-        rise += correlation / complement * (_height(low_given, log_given) - _height(high_given, log_given))
+        with np.errstate(over="ignore"):  # far from a component, where it has no height
+            rise += correlation / complement * (_height(low_given, log_given) - _height(high_given, log_given))
     heights = weights[:, None] * np.exp(log_density)
-    smooth = HermiteCubics(coarse, heights.sum(axis=0), (heights * rise / sd[:, None]).sum(axis=0))
+    slopes = np.where(heights > 0, rise, 0.0) * heights / sd[:, None]
+    smooth = HermiteCubics(coarse, heights.sum(axis=0), slopes.sum(axis=0))
     points = refined(coarse)
     return Marginal.of(mean, float(np.sqrt(variance)), points, smooth(points), smooth.integral(points))
 
