@@ -228,6 +228,12 @@ def test_an_interval_is_in_one_line_in_the_terminal(capsys):
     assert [line.strip() for line in capsys.readouterr().out.splitlines()][3] == "95 % interval 0.000023 to 0.000110"
 
 
+def test_no_word_is_cut_beside_a_long_name_in_the_terminal(capsys):
+    remark = "all within the measured range of I1 and I2"
+    print_result(result_of(numbers=(Number("n" * 66, "0 % of the points", remark=remark),)).record())
+    assert remark in " ".join(capsys.readouterr().out.split())
+
+
 def test_exponents_stay_in_one_piece_on_a_page(tmp_path):
     write_result(result_of(finding="1.4e-05 to 8.6e-05 MPa, not phase-2"), tmp_path, figures=False)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

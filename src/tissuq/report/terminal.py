@@ -122,11 +122,10 @@ def _print_numbers(numbers: Sequence[Mapping[str, Any]]) -> None:
     """Print numbers, each with its ``name``, ``text`` and ``remark``."""
     width = max((len(number["name"]) for number in numbers), default=0)
     for number in numbers:
-        remark = str(number["remark"])
-        if len(remark) <= PROSE + GAP:
+        remark, start = str(number["remark"]), f"  {number['name']:<{width}}  "
+        if len(remark) <= max(TEXT_WIDTH - len(start), PROSE):
             remark = remark.replace(" ", "\u00a0")  # an interval in one line
         remark = f", {remark}" if remark else ""
-        start = f"  {number['name']:<{width}}  "
         print(wrapped(f"{number['text']}{remark}", max(TEXT_WIDTH, len(start) + PROSE), initial_indent=start,
                       subsequent_indent=" " * len(start), break_on_hyphens=False))  # fmt: skip
 
