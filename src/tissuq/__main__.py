@@ -1,13 +1,9 @@
 """The program: `tissuq`, and `python -m tissuq`."""
 
-import gc
 import os
 import sys
 
 __all__ = ["main"]
-
-OBJECTS_BETWEEN_COLLECTIONS = 100_000
-"""Of Python's garbage collector, which by default looks through all modules' objects many times while they load."""
 
 
 def main() -> None:
@@ -16,7 +12,6 @@ def main() -> None:
     NumPy reads the number of OpenBLAS's threads when it is imported: more than one slow the many small matrices of a
     fit down.
     """
-    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from tissuq.cli.app import main as run
