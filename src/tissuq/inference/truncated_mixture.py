@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.errors import ConvergenceError
 from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import (
@@ -24,7 +26,7 @@ from tissuq.inference.nested import MAX_NESTED, nested_log_density, nested_point
 from tissuq.inference.quasi_monte_carlo import quasi_random
 from tissuq.parameters.normal_interval import log_interval
 
-__all__ = ["TruncatedMixture"]
+__all__ = ["TruncatedMixture", "checked_masses"]
 
 FloatArray = NDArray[np.float64]
 
@@ -40,6 +42,10 @@ SAME_GAUSSIAN = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MAX_VALUES = 300_000
 """Values of single Gaussians, at most, from which the density of a cut mixture is computed."""
+HEAVY_SHARE = 1e-6
+"""Share of the posterior, and mass beyond bounds, above which a component's error counts."""
+MAX_LOG_MASS_ERROR = 0.1
+"""Error of the log mass within bounds from which the result is refused."""
 FAR_SDS = 15.0
 """Standard deviations beyond a bound from which a cut Gaussian's variance is taken from its expansion."""
 
@@ -155,6 +161,39 @@ class TruncatedMixture:
         log_shares, points = self._boxes(gaussians).points(gaussians.mean, gaussians.root, number)
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         return _of_points(gaussians, shares / shares.sum(axis=1, keepdims=True), points)
+
+
+def checked_masses(
+    symbols: Sequence[str], mixture: GaussianMixture, mass_outside: FloatArray, box: Boxes
+) -> tuple[FloatArray, float]:
+    """Return the log masses within bounds of the components that these cut notably, and the error of all.
+
+    Parameters
+    ----------
+    symbols : sequence of str
+        The parameters.
+    mixture : GaussianMixture
+        Weights after the bounds have cut.
+    mass_outside : (M, p) array
+        Of each component beyond the bounds of each parameter.
+    box : Boxes
+        The bounds (1, p).
+
+    Raises
+    ------
+    ConvergenceError
+        When they are not known well enough.
+    """
+    weights, outside = mixture.weights, mass_outside.sum(axis=1)
+    heavy = np.flatnonzero((weights > HEAVY_SHARE) & (outside > HEAVY_SHARE))
+    log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
+    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(outside, HEAVY_SHARE))
+    if error_of_mass > MAX_LOG_MASS_ERROR:
+        raise ConvergenceError(
+            f"bounds of several linear parameters ({', '.join(symbols)}) cut so deep that the mass "
+            "within them is not known well enough; use the method 'joint', or wider priors."
+        )
+    return log_mass, error_of_mass
 
 
 def _of_points(gaussians: GaussianMixture, shares: FloatArray, points: FloatArray) -> GaussianMixture:

@@ -14,10 +14,12 @@ from tissuq.mechanics.invariants import invariant_rates, largest_invariants
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, Uniform
 
-__all__ = ["default_boxes", "default_prior", "off_zero", "support"]
+__all__ = ["MAX_SCORE", "at_scores", "default_boxes", "default_prior", "off_zero", "support"]
 
 FloatArray = NDArray[np.float64]
 
+MAX_SCORE = 8.0
+"""Standard deviations beyond which probabilities round to one."""
 BOX_MARGIN = 10.0
 """Default boxes of linear parameters reach this many times further than least squares could."""
 
@@ -72,6 +74,21 @@ def default_boxes(
 def off_zero(prior: Prior, probability: float) -> float:
     """Return a quantile, or where that is zero, by which laws may divide, one nearby."""
     return float(prior.quantile(probability)) or float(prior.quantile(probability + 0.005))
+
+
+def at_scores(priors: Sequence[Prior], scores: FloatArray) -> FloatArray:
+    """Return the values (N, d) of parameters at coordinates (N, d) that are standard normal under their priors.
+
+    None is zero, as of `off_zero`.
+    """
+    from scipy.special import ndtr
+
+    probabilities, values = ndtr(np.clip(scores, -MAX_SCORE, MAX_SCORE)), np.empty(scores.shape)
+    for side, prior in enumerate(priors):
+        values[:, side] = prior.quantile(probabilities[:, side])
+        for row in np.flatnonzero(values[:, side] == 0):
+            values[row, side] = off_zero(prior, float(probabilities[row, side]))
+    return values
 
 
 def support(parameter: Parameter, data: Experiment) -> tuple[float, float]:

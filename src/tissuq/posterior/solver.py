@@ -70,7 +70,7 @@ class Solver:
 
     def _is_integrated(self, model: StatisticalModel) -> bool:
         """Return whether there is an evidence without sampling."""
-        is_summed = bool(model.energy_symbols) or not AdaptedPoints().why_not(model)
+        is_summed = bool(model.energy_symbols) or not AdaptedPoints.why_not(model)
         return self.method in ("auto", "exact") and is_summed
 
     def _sums_noise(self, model: StatisticalModel) -> bool:
@@ -125,7 +125,7 @@ class Solver:
             return sampler
         if model.energy_symbols:
             return AmplitudeLattice()
-        if (refusal := AdaptedPoints().why_not(model)) and self.method == "auto":
+        if (refusal := AdaptedPoints.why_not(model)) and self.method == "auto":
             return _sampler("nuts", refusal)
         return AdaptiveCells() if refusal or _suits_cells(model) else AdaptedPoints()
 

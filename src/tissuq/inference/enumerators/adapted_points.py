@@ -10,19 +10,18 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy
-from tissuq.inference.enumerators.outer import MAX_SCORE
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.threads import one_thread
-from tissuq.inference.truncated_mixture import TruncatedMixture
-from tissuq.model.scales import off_zero
+from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
+from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["AdaptedPoints"]
+__all__ = ["IRRELEVANT_LOG_DROP", "AdaptedPoints"]
 
 FloatArray = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ POINTS_PER_PARAMETER = 256
 EFFECTIVE_MULTIPLE = 20.0
 """Effective points over those of values that each cost a sum over energies, for which `Accuracy` is made."""
 IRRELEVANT_LOG_DROP = 14.0
-"""Log density below the largest at which the mass inside the bounds need not be known exactly."""
+"""Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
 NEGLIGIBLE_WEIGHT = 1e-9
 """Share of the posterior that a point must hold."""
 MAX_COMPONENTS = 3000
@@ -52,7 +51,8 @@ class AdaptedPoints:
     accuracy: Accuracy = FINE
     proposal: Proposal | None = None
 
-    def why_not(self, model: StatisticalModel) -> str:
+    @staticmethod
+    def why_not(model: StatisticalModel) -> str:
         """Return why it does not serve a model; nothing where it does."""
         if model.has_directions:
             return ""
@@ -92,7 +92,8 @@ class AdaptedPoints:
         weights, settings = weights[matters] / weights[matters].sum(), density.settings(adaptation.points[matters])
         box, gaussians = density.conditional.boxes, density.conditional(settings[None])
         mixture = GaussianMixture(weights, settings, gaussians.mean[0], gaussians.root[0])
-        truncated = TruncatedMixture.of(mixture, box.beyond(mixture.mean, mixture.root), box)
+        mass_outside = box.beyond(mixture.mean, mixture.root)
+        truncated = TruncatedMixture.of(mixture, mass_outside, box)
 
         def marginal(symbol: str) -> Marginal:
             if symbol in model.linear:
@@ -112,8 +113,8 @@ class AdaptedPoints:
         )
         if any(isinstance(prior, Flat) for prior in model.priors.values()):
             return solution
-        _, error_of_mass = box.repeated(len(weights)).log_mass(mixture.mean, mixture.root)
-        error = float(np.sqrt(1 / number - 1 / len(log_weights)) + weights @ error_of_mass)
+        _, error_of_mass = checked_masses(model.linear, mixture, mass_outside, box)
+        error = float(np.sqrt(1 / number - 1 / len(log_weights))) + error_of_mass
         return replace(solution, log_evidence=adaptation.log_mass, log_evidence_error=error)
 
 
@@ -126,14 +127,7 @@ class _Density:
 
     def settings(self, points: FloatArray) -> FloatArray:
         """Return the values (N, d) at points (N, d)."""
-        from scipy.special import ndtr
-
-        probabilities = ndtr(np.clip(points, -MAX_SCORE, MAX_SCORE)).T
-        columns = [
-            [off_zero(prior, float(p)) for p in of_prior]
-            for prior, of_prior in zip(self._priors, probabilities, strict=True)
-        ]
-        return np.array(columns).T
+        return at_scores(self._priors, points)
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return it (N,) at points (N, d)."""

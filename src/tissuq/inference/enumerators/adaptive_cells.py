@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.inference.enumerators.adapted_points import AdaptedPoints
+from tissuq.inference.enumerators.adapted_points import IRRELEVANT_LOG_DROP, AdaptedPoints
 from tissuq.inference.enumerators.line import FINE
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
@@ -32,7 +32,7 @@ from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.threads import one_thread
-from tissuq.inference.truncated_mixture import TruncatedMixture
+from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
@@ -42,14 +42,8 @@ FloatArray = NDArray[np.float64]
 
 DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
-IRRELEVANT_LOG_DROP = 14.0
-"""Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
-MAX_LOG_MASS_ERROR = 0.1
-"""Error of the log mass within bounds from which the result is refused."""
 MANY_LINES = 2000
 """Of a quadrature, beyond which a marginal is tabulated at fewer points."""
-HEAVY_SHARE = 1e-6
-"""Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +64,7 @@ class AdaptiveCells:
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""
-        if reason := AdaptedPoints().why_not(model):
+        if reason := AdaptedPoints.why_not(model):
             return reason
         if len(model.nonlinear) > MAX_DIMENSION:
             return (
@@ -227,14 +221,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     )
     if any(isinstance(prior, Flat) for prior in model.priors.values()):
         return solution
-    heavy = np.flatnonzero((weights > HEAVY_SHARE) & (mass_outside.sum(axis=1) > HEAVY_SHARE))
-    log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
-    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY_SHARE))
-    if error_of_mass > MAX_LOG_MASS_ERROR:
-        raise ConvergenceError(
-            f"bounds of several linear parameters ({', '.join(model.linear)}) cut so deep that the mass "
-            "within them is not known well enough; use the method 'joint', or wider priors."
-        )
+    log_mass, error_of_mass = checked_masses(model.linear, mixture, mass_outside, box)
     if rule:
         evidence = float(rule.log_integral[index])
         error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT_LOG_DROP) + error_of_mass)

@@ -11,15 +11,13 @@ from tissuq.inference.enumerators.lattice import Rows
 from tissuq.inference.enumerators.line import Line
 from tissuq.inference.marginal import Marginal, marginal_of_table
 from tissuq.inference.quasi_monte_carlo import log_normal
-from tissuq.model.scales import off_zero
+from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["MAX_SCORE", "TINY", "Outer"]
+__all__ = ["TINY", "Outer"]
 
 FloatArray = NDArray[np.float64]
 
-MAX_SCORE = 8.0
-"""Standard deviations beyond which probabilities round to one."""
 LOG_RATIO_SD = 3.0
 """Standard deviation of the log of a ratio of noise parameters, in the coordinate that proposes it."""
 TINY = 1e-300
@@ -46,15 +44,10 @@ class Outer:
         self.of_noise = np.isin(self.symbols, [p.symbol for p in model.noise.parameters])
         self._middle = -np.log(np.median(model.levels)) if self.of_noise.any() else 0.0
 
-    def settings(self, point: FloatArray) -> FloatArray:
-        """Return the values (d,) at a point (d,); ratios in place of the noise's parameters."""
-        from scipy.special import ndtr
-
-        probability = ndtr(np.clip(point, -MAX_SCORE, MAX_SCORE))
-        quantiles = [
-            off_zero(self._model.priors[symbol], float(p)) for symbol, p in zip(self.symbols, probability, strict=True)
-        ]
-        return np.where(self.of_noise, np.exp(self._middle + LOG_RATIO_SD * point), quantiles)
+    def settings(self, points: FloatArray) -> FloatArray:
+        """Return the values (N, d) at points (N, d); ratios in place of the noise's parameters."""
+        quantiles = at_scores([self._model.priors[symbol] for symbol in self.symbols], points)
+        return np.where(self.of_noise, np.exp(self._middle + LOG_RATIO_SD * points), quantiles)
 
     def log_base(self, point: FloatArray) -> float:
         """Return the log density of the priors in the coordinates at a point (d,); of ratios, that of the measure."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy, first_places, known_along, peaks
 from tissuq.inference.enumerators.nodes import Node, Sums
-from tissuq.inference.enumerators.outer import MAX_SCORE, TINY, Outer
+from tissuq.inference.enumerators.outer import TINY, Outer
 from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, Proposal, adapted, effective
+from tissuq.model.scales import MAX_SCORE
 from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["Guide", "relative_error", "weighted_nodes"]
@@ -91,7 +92,7 @@ class _Search:
         freedom, noise = model.experiment.size - len(model.linear), model.noise
 
         def log_likelihood(scores: FloatArray) -> FloatArray:
-            settings, misfit = self._settings(scores[:, None]), np.empty(len(scores))
+            settings, misfit = self._outer.settings(scores[:, None]), np.empty(len(scores))
             for rows in self._outer.alike(settings, len(settings)):
                 misfit[rows] = (self._outer.rows(settings[rows]).fit.left ** 2).sum(axis=(1, 2))
             if noise.parameters:
@@ -130,25 +131,22 @@ class _Search:
     def _scouted(self, points: FloatArray) -> FloatArray:
         """Return the logarithms of the density at points (N, d), roughly: from a few of the members."""
         scouts = self._members[:: -(-len(self._members) // SCOUT_MEMBERS)]
-        sums = self._sums.points(self._settings(points), scouts)
+        sums = self._sums.points(self._outer.settings(points), scouts)
         return np.asarray(self._bases(points) + [np.logaddexp.reduce(of_point.log_mass) for of_point in sums])
 
     def _nodes(self, points: FloatArray) -> list[Node]:
-        return self._sums.nodes(self._settings(points), self._members)
+        return self._sums.nodes(self._outer.settings(points), self._members)
 
     def _log_masses(self, nodes: Sequence[Node], points: FloatArray) -> FloatArray:
         """Return the logarithms of the density at points (N, d), given the nodes there."""
         return np.asarray(self._bases(points) + [node.log_mass for node in nodes])
-
-    def _settings(self, points: FloatArray) -> FloatArray:
-        return np.array([self._outer.settings(point) for point in points])
 
     def _bases(self, points: FloatArray) -> FloatArray:
         return np.array([self._outer.log_base(point) for point in points])
 
     def _leave_out_members(self, point: FloatArray) -> None:
         """Leave out members that have next to no mass at a point (d,) in the middle of the posterior."""
-        (points,) = self._sums.points(self._settings(point[None]), self._members)
+        (points,) = self._sums.points(self._outer.settings(point[None]), self._members)
         masses = np.bincount(points.lattice, np.exp(points.log_mass - points.log_mass.max()), len(self._members))
         order = np.argsort(masses)
         self._members = np.sort(order[np.cumsum(masses[order]) > NEGLIGIBLE_MEMBERS * masses.sum()])
