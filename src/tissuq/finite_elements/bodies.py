@@ -7,11 +7,15 @@ from math import ceil, log
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import ACROSS, AXIAL, Case, FloatArray, Mesh, RigidTip, Supports
 
 __all__ = ["ClampedBar", "Indentation", "PlateWithHole", "SphericalIndentation", "graded", "grid"]
+
+ROUNDING = 1e-9
+"""Distance over the size of a body up to which a point lies on a plane."""
 
 
 def graded(length: float, smallest_cell: float, growth: float) -> FloatArray:
@@ -74,12 +78,24 @@ class ClampedBar(Case):
 
     def supports(self, points: FloatArray) -> Supports:
         axial, radial = points[:, AXIAL], points[:, ACROSS]
-        tolerance = 1e-9 * self.bar_length
+        tolerance = ROUNDING * self.bar_length
         middle, clamp = axial < tolerance, axial > self.bar_length / 2 - tolerance
         return Supports(np.stack([middle, clamp | (radial < tolerance)], axis=-1), clamp, 0.5)
 
 
 Contact = Literal["bonded", "frictionless"]
+
+
+def _surface_and_base(points: FloatArray, height: float, radius: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which points of a disc on its base lie on its surface (n,), and which directions of them are held (n, 2).
+
+    The base is held, and the axis in its place.
+    """
+    axial, radial = points[:, AXIAL], points[:, ACROSS]
+    tolerance = ROUNDING * radius
+    base = axial < tolerance
+    return axial > height - tolerance, np.stack([base, base | (radial < tolerance)], axis=-1)
+
 
 PUNCH_CELL, PUNCH_GROWTH = 0.05, 1.3
 """Size of the cells at the punch's edge with fineness 1, in punch radii, and ratio of neighbouring cells' sizes."""
@@ -135,12 +151,9 @@ class Indentation(Case):
         return grid(graded_towards(self.height, smallest_cell, growth), np.concatenate([inside, a + outside[1:]]))
 
     def supports(self, points: FloatArray) -> Supports:
-        axial, radial = points[:, AXIAL], points[:, ACROSS]
-        tolerance = 1e-9 * self.radius
-        base = axial < tolerance
-        punch = (axial > self.height - tolerance) & (radial < self.punch_radius + tolerance)
-        sticks = punch & (self.contact == "bonded")
-        fixed = np.stack([base, base | (radial < tolerance) | sticks], axis=-1)
+        surface, fixed = _surface_and_base(points, self.height, self.radius)
+        punch = surface & (points[:, ACROSS] < self.punch_radius + ROUNDING * self.radius)
+        fixed[:, ACROSS] |= punch & (self.contact == "bonded")
         return Supports(fixed, punch, -1.0)
 
 
@@ -196,7 +209,7 @@ class PlateWithHole(Case):
         return Mesh(points.reshape(-1, 3), np.stack(corners, axis=-1))
 
     def supports(self, points: FloatArray) -> Supports:
-        tolerance = 1e-9 * self.width
+        tolerance = ROUNDING * self.width
         pulled = points[:, AXIAL] > self.width / 2 - tolerance
         return Supports(points < tolerance, pulled, 0.5, parts=4.0)
 
@@ -245,10 +258,6 @@ class SphericalIndentation(Case):
         return grid(graded_towards(self.height, smallest_cell, growth), radial)
 
     def supports(self, points: FloatArray) -> Supports:
-        axial, radial = points[:, AXIAL], points[:, ACROSS]
-        tolerance = 1e-9 * self.radius
-        base = axial < tolerance
-        surface = (axial > self.height - tolerance) & (radial < self.tip_radius)
-        fixed = np.stack([base, base | (radial < tolerance)], axis=-1)
-        tip = RigidTip(surface, self.height, self.tip_radius)
+        surface, fixed = _surface_and_base(points, self.height, self.radius)
+        tip = RigidTip(surface & (points[:, ACROSS] < self.tip_radius), self.height, self.tip_radius)
         return Supports(fixed, np.zeros(len(points), dtype=bool), -1.0, load=tip)
