@@ -150,7 +150,7 @@ def _curve(reading: Reading, number: int) -> dict[str, Any]:
     ]
     return {
         "label": used.labels[number],
-        "x": reading.experiment.mode.abscissa_name,
+        "x": reading.experiment.mode.abscissa_control.name,
         "y": f"engineering stress [{unit.name}]",
         "recorded": _points(reading.recorded.stretch[number], reading.recorded.stress[number], unit),
         "used": _points(used.stretch[number], used.stress[number], unit),

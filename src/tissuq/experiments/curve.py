@@ -75,7 +75,7 @@ class Curve:
     @property
     def abscissa_name(self) -> str:
         """What `abscissa` is called on an axis."""
-        return self.mode.abscissa_name
+        return self.mode.abscissa_control.name
 
     @property
     def is_back(self) -> NDArray[np.bool_]:

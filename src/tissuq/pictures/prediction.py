@@ -142,7 +142,7 @@ def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob
                 calibrated=None if several else calibrated_range(model, mode, is_directed=is_directed),
                 ways=ways_of(mode, points, stress.stretch),
                 measured=_measured(solution, mode, channel),
-                label=mode.abscissa_name,
+                label=mode.abscissa_control.name,
                 title=mode.name if is_joint else f"{mode.name}\n{model.material.name} alone, discrepancy unknown",
                 quantity=quantity,
             )

@@ -88,6 +88,6 @@ def _draw_fitted(axis: Axes, reading: Reading, number: int) -> None:
 def _label(axis: Axes, reading: Reading, number: int, title: str) -> None:
     label, mode = reading.used.labels[number], reading.experiment.mode
     axis.set_title(f"{label}, {title}" if label else title, fontsize=LETTERS + 1)
-    axis.set_xlabel(mode.abscissa_name, fontsize=LETTERS)
+    axis.set_xlabel(mode.abscissa_control.name, fontsize=LETTERS)
     axis.set_ylabel(f"engineering stress [{reading.experiment.stress_unit}]", fontsize=LETTERS)
     axis.tick_params(labelsize=LETTERS)

@@ -115,9 +115,9 @@ class LoadingMode(ABC):
         return self.controls == (STRETCH,) and len(self.stresses) == 1
 
     @property
-    def abscissa_name(self) -> str:
+    def abscissa_control(self) -> Control:
         """What stresses are drawn against: the first control, or where there are several stresses a stretch of each."""
-        return self.controls[0].name if 1 in (len(self.controls), len(self.stresses)) else "stretch"
+        return self.controls[0] if 1 in (len(self.controls), len(self.stresses)) else STRETCH
 
     @property
     def reference(self) -> Any:

@@ -30,11 +30,10 @@ AT_ITS_LENGTH = (
 
 @dataclass(frozen=True, eq=False)
 class AxialStretch:
-    """The axial stretch (n,) of every row, and where it comes from; ``column`` where it is read from one."""
+    """The axial stretch (n,) of every row, and where it comes from."""
 
     values: Column
     source: str
-    column: int | None = None
 
 
 def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None:
@@ -112,7 +111,7 @@ def _required(table: Table, given: float | None, options: ReadingOptions) -> Axi
             "such as 1.5. If the column is in percent, write % in its heading; or give the stretch as --axial-stretch."
         )
     if given is None:
-        return AxialStretch(values, f"axial stretch = column {label}", column)
+        return AxialStretch(values, f"axial stretch = column {label}")
     row = int(np.argmax(np.abs(values - given)))
     if abs(values[row] - given) > SAME_STRETCH:
         raise InputError(

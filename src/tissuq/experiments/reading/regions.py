@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.modes.mode import STRETCH, Control, LoadingMode
+from tissuq.experiments.modes.mode import Control, LoadingMode
 from tissuq.experiments.reading.disturbances import (
     UNIFORM_SD,
     Event,
@@ -74,7 +74,7 @@ class TestedStress:
     @property
     def control(self) -> Control:
         """What the course is of: the mode's control, or the mean stretch where there are several."""
-        return self.mode.controls[0] if 1 in (len(self.mode.controls), len(self.mode.stresses)) else STRETCH
+        return self.mode.abscissa_control
 
     @cached_property
     def peak(self) -> int:
