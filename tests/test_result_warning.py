@@ -8,7 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from tissuq.result_warning import WARNING_CODES, ResultWarning, Severity, has_code, in_shell, merged, most_severe_first
+from tissuq.result_warning import (
+    WARNING_CODES,
+    ResultWarning,
+    Severity,
+    has_code,
+    in_shell,
+    merged,
+    most_severe_first,
+    symbols_in,
+)
 
 PAGE = Path(__file__).parents[1] / "docs" / "warnings.md"
 
@@ -66,6 +75,13 @@ def test_of_several_results_a_warning_stands_once_with_their_names():
     assert merged({"a": [cut[0]], "b": [cut[1]]}) == ["a: cut by a bound of C01.", "b: cut by a bound of C20."]
     assert merged({"a": [first, other]}) == [first, other]
     assert merged({"a": [other]}, named=True) == ["a: few."]
+
+
+def test_a_warning_keeps_the_parameters_that_it_is_about():
+    one, other = (ResultWarning(f"cut: {s}.", "prior-bound", symbols=s.split()) for s in ("C10 C20", "C20"))
+    warnings = [one.of(["a"]), other.as_note(), ResultWarning("few.", "few-measurements", symbols=["C30"])]
+    assert symbols_in(warnings, "prior-bound") == ("C10", "C20")
+    assert symbols_in(warnings, "slack") == ()
 
 
 def test_a_note_says_what_the_warning_said():

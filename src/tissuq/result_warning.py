@@ -7,7 +7,16 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from types import MappingProxyType
 
-__all__ = ["WARNING_CODES", "ResultWarning", "Severity", "has_code", "in_shell", "merged", "most_severe_first"]
+__all__ = [
+    "WARNING_CODES",
+    "ResultWarning",
+    "Severity",
+    "has_code",
+    "in_shell",
+    "merged",
+    "most_severe_first",
+    "symbols_in",
+]
 
 
 class Severity(StrEnum):
@@ -67,12 +76,14 @@ class ResultWarning(str):
     code : str
         One of `WARNING_CODES`.
     severity : Severity
+    symbols : sequence of str
+        The parameters that it is about, where it names some.
     **options : str
         Values of the options in the text, by their names in Python.
 
     Attributes
     ----------
-    code, severity
+    code, severity, symbols
         As above.
     shell : str
         The sentence in the form that a person at a shell can type.
@@ -89,10 +100,16 @@ class ResultWarning(str):
 
     code: str
     severity: Severity
+    symbols: tuple[str, ...]
     shell: str
 
     def __new__(
-        cls, text: str, code: str = "measurements", severity: Severity = Severity.CAUTION, **options: str
+        cls,
+        text: str,
+        code: str = "measurements",
+        severity: Severity = Severity.CAUTION,
+        symbols: Iterable[str] = (),
+        **options: str,
     ) -> ResultWarning:
         """Return the sentence with its options in both forms."""
         if code not in WARNING_CODES:
@@ -100,7 +117,7 @@ class ResultWarning(str):
         python = {name: f'{name}="{value}"' for name, value in options.items()}
         shell = {name: f"--{name.replace('_', '-')} {value}" for name, value in options.items()}
         warning = super().__new__(cls, text.format(**python) if options else text)
-        warning.code, warning.severity = code, severity
+        warning.code, warning.severity, warning.symbols = code, severity, tuple(symbols)
         warning.shell = text.format(**shell) if options else text
         return warning
 
@@ -118,7 +135,7 @@ class ResultWarning(str):
         return self._written(self + end, self.shell + end, self.severity)
 
     def _written(self, python: str, shell: str, severity: Severity) -> ResultWarning:
-        warning = ResultWarning(python, self.code, severity)
+        warning = ResultWarning(python, self.code, severity, self.symbols)
         warning.shell = shell
         return warning
 
@@ -126,6 +143,11 @@ class ResultWarning(str):
 def has_code(warnings: Iterable[str], code: str) -> bool:
     """Whether some warning is of a code; plain sentences have none."""
     return any(isinstance(warning, ResultWarning) and warning.code == code for warning in warnings)
+
+
+def symbols_in(warnings: Iterable[ResultWarning], code: str) -> tuple[str, ...]:
+    """Return the parameters that the warnings of a code are about, each of them once."""
+    return tuple(dict.fromkeys(symbol for w in warnings if w.code == code for symbol in w.symbols))
 
 
 def in_shell(warning: str) -> str:

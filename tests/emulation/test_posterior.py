@@ -16,6 +16,7 @@ from tissuq.emulation.problem import pose
 from tissuq.emulation.sampling import sample_posterior
 from tissuq.errors import InputError, ModelError
 from tissuq.model.discrepancy import PinnedProcess
+from tissuq.result_warning import symbols_in
 
 TRUTH = {"mu": 1.5, "alpha": -9.0}
 
@@ -254,6 +255,7 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)
     found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 1.18)}, noise_sd=0.02, runs=6)
     assert any("reaches the bound of the prior of C10 (upper)" in text for text in found.warnings)
+    assert symbols_in(found.warnings, "prior-bound") == ("C10",)
 
 
 def test_a_parameter_that_the_model_does_not_use_is_named_and_one_that_is_hardly_known_is_not():

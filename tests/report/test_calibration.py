@@ -52,8 +52,12 @@ def study(
     )  # fmt: skip
 
 
-CUT = ResultWarning("the posterior reaches the bound of the prior of b (upper): give a wider prior.", "prior-bound")
-UNREAD = ResultWarning("the model hardly depends on mu, and the result is the prior.", "poorly-determined")
+CUT = ResultWarning(
+    "the posterior reaches the bound of the prior of b (upper): give a wider prior.", "prior-bound", symbols=["b"]
+)
+UNREAD = ResultWarning(
+    "the model hardly depends on mu, and the result is the prior.", "poorly-determined", symbols=["mu"]
+)
 NONE_FIT = ResultWarning("no parameters that the priors allow give ...", "unmodelled-curve", Severity.PROBLEM)
 EMULATOR = ResultWarning("the emulator is over-confident.", "inaccurate-emulator")
 
@@ -89,11 +93,11 @@ def test_verdicts_on_a_calibration_say_what_stands_against_its_use_and_the_next_
     ]  # fmt: skip
     assert tuple(use.verdict for use in uses) == verdicts
     assert reason in uses[0].reason
-    assert next_step_of(study(**case)).startswith(step)
+    assert next_step_of(study(**case), uses).startswith(step)
 
 
 def test_a_process_that_is_pinned_far_from_the_measurements_takes_stiffness_as_a_free_one():
     far = study()
     far.data[""] = SimpleNamespace(control=DEPTH + 5)
     assert [use.verdict for use in uses_of_calibration(far)] == [NO, YES, NO]
-    assert "--discrepancy gp-pinned --force --zero-load C" in next_step_of(far)
+    assert "--discrepancy gp-pinned --force --zero-load C" in next_step_of(far, uses_of_calibration(far))

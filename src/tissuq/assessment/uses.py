@@ -18,7 +18,7 @@ from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
 from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
-from tissuq.result_warning import ResultWarning, Severity
+from tissuq.result_warning import ResultWarning, Severity, symbols_in
 
 __all__ = [
     "MIN_INSIDE",
@@ -92,7 +92,7 @@ def _reporting(
 ) -> tuple[Verdict, str]:
     """Return whether the modulus can be reported."""
     symbols = modulus_symbols(solution.model)
-    is_cut = any(w.code == "prior-bound" and any(f"{symbol} (" in w for symbol in symbols) for w in warnings)
+    is_cut = not set(symbols_in(warnings, "prior-bound")).isdisjoint(symbols)
     reasons_against = {
         "sampling has not converged": "not-converged" in codes,
         "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["NO_PARAMETERS_FIT", "calibration_warnings"]
 
 FloatArray = NDArray[np.float64]
+Ends = list[tuple[str, str]]
+"""Parameters, and of each the lower or the upper end."""
 
 NO_PARAMETERS_FIT = "no parameters that the priors allow give the measurements"
 """Start of the warning that something other than the parameters is wrong."""
@@ -105,6 +107,7 @@ def calibration_warnings(
             f"the model hardly depends on {', '.join(without_effect)}, and the result is the prior: see whether the "
             "model reads a parameter of this name (--prior).",
             "poorly-determined",
+            symbols=without_effect,
         )
     yield from _far_from_zero_load(problem)
     none_fit = list(_no_parameters_fit(problem, emulator, posterior, likelihood))
@@ -125,16 +128,17 @@ def calibration_warnings(
     at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
         yield ResultWarning(
-            f"the posterior lies beyond the runs of the model in {', '.join(beyond_runs)}, which lie where its prior "
+            f"the posterior lies beyond the runs of the model in {_listed(beyond_runs)}, which lie where its prior "
             "is: the emulator extrapolates, or the prior contradicts the measurements. Let runs be placed where the "
             "posterior is (refine).",
             "inaccurate-emulator",
         )
     if at_bounds:
         yield ResultWarning(
-            f"the posterior reaches the bound of the prior of {', '.join(at_bounds)}: there the prior, not the data, "
-            "decides. Give a wider prior, unless the bound is intended.",
+            f"the posterior reaches the bound of the prior of {_listed(at_bounds)}: there the prior, "
+            "not the data, decides. Give a wider prior, unless the bound is intended.",
             "prior-bound",
+            symbols=[symbol for symbol, _ in at_bounds],
         )
     yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
 
@@ -281,10 +285,9 @@ def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> flo
     return float(runs.failed[nearest].mean())
 
 
-def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[list[str], list[str]]:
+def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[Ends, Ends]:
     """Return where the posterior is at bounds of priors, and where more of it than of the prior is beyond all runs."""
-    at_bounds: list[str] = []
-    beyond_runs: list[str] = []
+    at_bounds, beyond_runs = Ends(), Ends()
     for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
         prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
         prior_values = np.asarray(prior.quantile((np.arange(PRIOR_POINTS) + 0.5) / PRIOR_POINTS))
@@ -296,5 +299,9 @@ def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) 
             is_beyond = sign * (values - bound) < edge if is_cut else sign * (values - run_end) < 0
             of_prior = 0.0 if is_cut else float((sign * (prior_values - run_end) < 0).mean())
             if posterior.weights[is_beyond].sum() > of_prior + MAX_EDGE_PROBABILITY:
-                (at_bounds if is_cut else beyond_runs).append(f"{symbol} ({end})")
+                (at_bounds if is_cut else beyond_runs).append((symbol, end))
     return at_bounds, beyond_runs
+
+
+def _listed(ends: Ends) -> str:
+    return ", ".join(f"{symbol} ({end})" for symbol, end in ends)

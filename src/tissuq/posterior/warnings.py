@@ -123,7 +123,7 @@ def warnings_about(
             f"numerical integration is inaccurate (error of the log evidence: {size}), and so are intervals. {remedy}",
             "inaccurate-integral",
         )
-    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
+    cut = list(_cut_by_prior(solution))
     lag1, held = _lag1_correlation(solution), int(inside.sum())
     if between_tests := _tests_apart(solution):
         yield ResultWarning(between_tests, "tests-apart")
@@ -144,9 +144,10 @@ def warnings_about(
         )
     if cut:
         yield ResultWarning(
-            f"{PRIOR_BOUND_REACHED} of {', '.join(cut)}: there the bound, not the data, determines the result. Give a "
-            "wider prior, unless the bound is intended.",
+            f"{PRIOR_BOUND_REACHED} of {', '.join(f'{symbol} ({end})' for symbol, end in cut)}: there the bound, not "
+            "the data, determines the result. Give a wider prior, unless the bound is intended.",
             "prior-bound",
+            symbols=[symbol for symbol, _ in cut],
         )
 
 

@@ -82,15 +82,15 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
         for symbol, marginal in calibration.marginals.items()
         if symbol in calibration.problem.forward_symbols
     ]
-    inside = f"{100 * calibration.predictive_coverage():.0f} % of the measurements"
+    inside, uses = f"{100 * calibration.predictive_coverage():.0f} % of the measurements", uses_of_calibration(study)
     return Result(
         command=_repeated(settings.model_copy(update=relocated)),
         title=f"Forward model {model}: {names_of(study)}",
         subject=f"{len(calibration.problem.measured)} measurements · {runs} runs · discrepancy {settings.discrepancy}",
         numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=remark)),
         finding=finding_of(study),
-        uses=uses_of_calibration(study),
-        next_step=next_step_of(study),
+        uses=uses,
+        next_step=next_step_of(study, uses),
         picture=Picture(
             "answer", lambda: band_figure(calibration, study.data, is_narrow=True),
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",

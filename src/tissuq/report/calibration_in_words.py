@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 
 from tissuq.assessment.uses import MIN_INSIDE, Use, Verdict, precision_of, relative_half_width, worst_of
@@ -10,7 +11,7 @@ from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.model.discrepancy import GaussianProcess, NoDiscrepancy, PinnedProcess
 from tissuq.prediction.bands import Band
-from tissuq.result_warning import Severity, has_code
+from tissuq.result_warning import Severity, has_code, symbols_in
 from tissuq.studies.calibration import CalibrationStudy
 
 __all__ = ["finding_of", "names_of", "next_step_of", "uses_of_calibration"]
@@ -49,7 +50,9 @@ def names_of(study: CalibrationStudy) -> str:
 def _reason_against(study: CalibrationStudy) -> str:
     """Return what stands against any use of the parameters; nothing where nothing does."""
     share = _share_of_emulator(study)
-    bounded, without_effect = _symbols_in(study, "prior-bound"), _symbols_in(study, "poorly-determined")
+    bounded, without_effect = (
+        ", ".join(symbols_in(study.warnings, code)) for code in ("prior-bound", "poorly-determined")
+    )
     reasons = {
         "sampling has not converged": not study.calibration.converged,
         "no parameters that the priors allow give the measurements": has_code(study.warnings, "unmodelled-curve"),
@@ -61,14 +64,6 @@ def _reason_against(study: CalibrationStudy) -> str:
         f"the error of the emulator makes up to {100 * share:.0f} % of the variance": share > TOO_LARGE_SHARE,
     }
     return next((reason for reason, applies in reasons.items() if applies), "")
-
-
-def _symbols_in(study: CalibrationStudy, code: str) -> str:
-    """Return the parameters that a warning of a code lists, as ``mu (lower), b (upper)`` or ``mu, b, and``."""
-    warnings = [warning for warning in study.warnings if warning.code == code]
-    symbols = study.calibration.problem.forward_symbols
-    named = [symbol for symbol in symbols if any(f" {symbol} (" in w or f" {symbol}, " in w for w in warnings)]
-    return ", ".join(named)
 
 
 def _takes_stiffness(study: CalibrationStudy) -> bool:
@@ -161,8 +156,8 @@ def finding_of(study: CalibrationStudy) -> str:
     return f"Means, and intervals that hold 95 %{units}. The error of the emulator makes {size} of their variance."
 
 
-def next_step_of(study: CalibrationStudy) -> str:
-    """Return what to do next, what stands against the use of the parameters first."""
+def next_step_of(study: CalibrationStudy, uses: Sequence[Use]) -> str:
+    """Return what to do next, given `uses_of_calibration`: what stands against the use of the parameters first."""
     calibration = study.calibration
     if has_code(study.warnings, "unmodelled-curve"):
         return "check units and signs of data and model (--unit, --factor), and the priors: no parameters fit the data."
@@ -170,7 +165,7 @@ def next_step_of(study: CalibrationStudy) -> str:
         return "make the posterior converge: repeat the command with --method nuts --force, or narrower priors."
     if has_code(study.warnings, "poorly-determined"):
         return "see whether the model reads the parameters that it hardly depends on, as the warning says."
-    if bounded := _symbols_in(study, "prior-bound"):
+    if bounded := ", ".join(symbols_in(study.warnings, "prior-bound")):
         return f"give {bounded} a wider --prior, and repeat the command with --force; keep a bound that nature sets."
     if _share_of_emulator(study) > LARGE_SHARE:
         return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."
@@ -182,7 +177,7 @@ def next_step_of(study: CalibrationStudy) -> str:
         return "calibrate a model that comes nearer to the measurements, such as one with another law."
     if study.posterior is not None:
         return "take the material further: tissuq predict {run} (export and structure take the run, too)"
-    if uses_of_calibration(study)[-1].verdict is Verdict.NO:
+    if uses[-1].verdict is Verdict.NO:
         return "let another test narrow the parameters: repeat the command with --prior-run RUN or narrower priors."
     return (
         "name the law of the model and the stretches in it: repeat the command with --material LAW --range LOW:HIGH "
