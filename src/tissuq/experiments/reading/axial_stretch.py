@@ -17,7 +17,14 @@ from tissuq.experiments.reading.uneven_stress import SAME_STRETCH, Tube, rows_at
 from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import strain_factor
 
-__all__ = ["AxialStretch", "axial_stretch_of", "column_of_axial_stretch", "note_of_tube", "stretches_held"]
+__all__ = [
+    "AxialStretch",
+    "axial_stretch_of",
+    "column_of_axial_stretch",
+    "note_of_stretched_tube",
+    "note_of_tube",
+    "stretches_held",
+]
 
 LARGEST = 4.0
 """Axial stretch beyond which a number is hardly one, but percent."""
@@ -136,6 +143,16 @@ def _not_at_its_length(place: str, stretch: float) -> InputError:
 def note_of_tube(tube: Tube, axial: AxialStretch | None) -> str:
     """Return what to know of stresses that are read from pressure and diameter of a tube."""
     return f"{AT_ITS_LENGTH} {tube.note}".rstrip() if axial is None else tube.note
+
+
+def note_of_stretched_tube(axial_stretch: Column) -> str:
+    """Return what is taken of a tube that was stretched along its axis, and what its test leaves open."""
+    return (
+        f"the tube is taken as held at {stretches_held(axial_stretch)} times its undeformed length, and as free of "
+        "stress when it is neither stretched nor inflated, the state that --diameter and --thickness are of. Its axial "
+        "stress is not read, so that a fit knows what the material does along the axis only as far as the hoop stress "
+        "shows it."
+    )
 
 
 def stretches_held(axial_stretch: Column) -> str:

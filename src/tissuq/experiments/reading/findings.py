@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.experiments.checked_arrays import LARGE_STRETCH
 from tissuq.experiments.modes import Biaxial, Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
-from tissuq.experiments.reading.axial_stretch import stretches_held
+from tissuq.experiments.reading.axial_stretch import note_of_stretched_tube
 from tissuq.experiments.reading.disturbances import scatter_of_neighbours
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
@@ -22,7 +22,6 @@ from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERROR
 from tissuq.experiments.reading.rows_of_tests import advice_on_numbered_tests, jump
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.uneven_stress import rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
@@ -108,7 +107,7 @@ def _stretch_size(reading: Reading, number: int) -> str:
 
 def _cycles(reading: Reading, number: int) -> str:
     count, ratios = len(reading.used_cycles), _ratios(reading)
-    if not _has_cycles(reading) or ratios == count or _has_axial_stretches(reading):
+    if not _has_cycles(reading) or ratios == count or reading.used.is_at_several_lengths:
         return ""
     if ratios > 1:
         return (
@@ -169,12 +168,6 @@ def _has_cycles(reading: Reading) -> bool:
     """Return whether there are several cycles of enough rows to be some."""
     count = len(reading.used_cycles)
     return count > 1 and len(reading.used) >= MIN_ROWS_PER_CYCLE * count
-
-
-def _has_axial_stretches(reading: Reading) -> bool:
-    """Return whether a tube was inflated at several axial stretches in turn, so that its cycles are no repetitions."""
-    axial = reading.used.axial_stretch
-    return axial is not None and len(rows_at_each_stretch(axial)) > 1
 
 
 def _ratios(reading: Reading) -> int:
@@ -295,33 +288,25 @@ def _diameter(reading: Reading, number: int) -> str:
     if stress[row] > NEGLIGIBLE_STRESS * stress.max():
         return ""
     narrow = 1.0 if axial is None else float(axial[row]) ** -0.5
+    start = (
+        f"in {reading.used.table.counted} {reading.used.table.lines[row]} the tube has hardly any pressure, and the "
+        f"hoop stretch {stretch[row]:.4g}"
+    )
     if abs(narrow - 1) > NOTABLE_SHARE:
         if abs(stretch[row] - 1) >= abs(stretch[row] - narrow):
             return ""
         return (
-            f"in {reading.used.table.counted} {reading.used.table.lines[row]} the tube has hardly any pressure, and "
-            f"the hoop stretch {stretch[row]:.4g} at an axial stretch of {narrow**-2:.4g}, where a wall without "
-            f"fibres has {narrow:.4g}: check that --diameter and --thickness are those of the tube when it is neither "
-            "stretched nor inflated."
+            f"{start} at an axial stretch of {narrow**-2:.4g}, where a wall without fibres has {narrow:.4g}: check "
+            "that --diameter and --thickness are those of the tube when it is neither stretched nor inflated."
         )
     if abs(stretch[row] - narrow) <= NOTABLE_SHARE * np.ptp(stretch):
         return ""
-    return (
-        f"in {reading.used.table.counted} {reading.used.table.lines[row]} the tube has hardly any pressure, and the "
-        f"hoop stretch {stretch[row]:.4g} instead of 1: check that its undeformed outer diameter is --diameter."
-    )
+    return f"{start} instead of 1: check that its undeformed outer diameter is --diameter."
 
 
 def _stretched_tube(reading: Reading, number: int) -> str:
-    """Return what is taken of a tube that was stretched along its axis, and what its test leaves open."""
     axial = reading.used.axial_stretch
-    if axial is None:
-        return ""
-    return (
-        f"the tube is taken as held at {stretches_held(axial)} times its undeformed length, and as free of stress when "
-        "it is neither stretched nor inflated, the state that --diameter and --thickness are of. Its axial stress is "
-        "not read, so that a fit knows what the material does along the axis only as far as the hoop stress shows it."
-    )
+    return "" if axial is None else note_of_stretched_tube(axial)
 
 
 def _many(reading: Reading, number: int) -> str:

@@ -16,6 +16,7 @@ from tissuq.experiments.branches import REVERSAL, turning_points
 from tissuq.experiments.reading.disturbances import ends_of_rests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
+from tissuq.experiments.reading.uneven_stress import rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
@@ -90,6 +91,11 @@ class MeasuredRows:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def is_at_several_lengths(self) -> bool:
+        """Whether a tube was inflated at several axial stretches in turn, so that its cycles are no repetitions."""
+        return self.axial_stretch is not None and len(rows_at_each_stretch(self.axial_stretch)) > 1
 
     @property
     def course(self) -> Column:
