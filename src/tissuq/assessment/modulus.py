@@ -1,4 +1,4 @@
-"""The initial shear modulus of a fitted material, which an energy discrepancy does not change."""
+"""Moduli that follow from the parameters of a fit: the initial shear modulus, and stiffnesses that were ratios."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tissuq.mechanics import Material, initial_shear_modulus, stress_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import coefficients, values_of
 
-__all__ = ["modulus", "modulus_moments", "modulus_symbols"]
+__all__ = ["derived_marginal", "modulus", "modulus_moments", "modulus_symbols"]
 
 FloatArray = NDArray[np.float64]
 
@@ -36,8 +36,24 @@ def modulus(solution: Solution) -> Marginal:
     if len(symbols) == 1 and not np.ptp(moduli, axis=0).any():
         factor = float(moduli[0, model.column_symbols.index(symbols[0])])
         return _scaled(solution.marginals[symbols[0]], factor)
-    bounds = (0.0 if solution.stable_in else -np.inf, np.inf)
-    means, root = modulus_moments(model, mixture)
+    return _marginal(solution, *modulus_moments(model, mixture), (0.0 if solution.stable_in else -np.inf, np.inf))
+
+
+def derived_marginal(solution: Solution, symbol: str) -> Marginal:
+    """Return the marginal posterior of one of the model's `derived_parameters`, which is proportional to a linear one."""
+    model, mixture = solution.model, solution.mixture
+    number = [parameter.symbol for parameter in model.material.plain.parameters].index(symbol)
+    units = model.material.unit_values(values_of(model, mixture, model.bent_symbols)[0])  # (M, p, k)
+    factors = np.array([[model.material.plain_values(unit)[number] for unit in component] for component in units])
+    columns = [model.column_symbols.index(p.symbol) for p in model.material.parameters if p.is_linear]
+    mean, root = coefficients(model, mixture)
+    means = (factors * mean[:, columns]).sum(axis=1)
+    return _marginal(solution, means, np.einsum("mk,mkp->mp", factors, root[:, columns]), (0.0, np.inf))
+
+
+def _marginal(solution: Solution, means: FloatArray, root: FloatArray, bounds: tuple[float, float]) -> Marginal:
+    """Return the marginal posterior of a quantity with means (M,) and roots (M, p) in every component, MPa."""
+    model, mixture = solution.model, solution.mixture
     sds = np.linalg.norm(root, axis=1)
     is_wide = sds > 0
     marginals = []

@@ -46,6 +46,10 @@ class Material(ABC):
     is_isotropic: ClassVar[bool] = True
     needs_matrix: ClassVar[bool] = False
     """Whether it has no stiffness of its own at the reference, so that it is only part of a sum."""
+    felt_axes: ClassVar[tuple[int, ...]] = ()
+    """The axes of the test, 0 and 1, along which it feels the stretch; none of an isotropic material."""
+    shears: ClassVar[bool] = False
+    """Whether it would shear where it is pulled along an axis of the test with free sides."""
 
     def __add__(self, material: Material) -> Material:
         return MaterialSum.of(self, material)
@@ -76,8 +80,17 @@ class Material(ABC):
         return self.energy(deformation.stretches, values)
 
     def why_not(self, deformation: Deformation) -> str:
-        """Return why a mode does not say how a specimen of this material deforms, in a sentence, or nothing."""
+        """Return why the stresses of a mode are not sums over the parameters of this material, or nothing."""
         return ""
+
+    @property
+    def plain(self) -> Material:
+        """The same material in the parameters of the literature."""
+        return self
+
+    def plain_values(self, values: Any) -> Any:
+        """Return values of the parameters of the literature, for those (k, ...) of its own parameters."""
+        return values
 
 
 class StretchMaterial(Material):
@@ -163,6 +176,16 @@ class MaterialSum(Material):
     def needs_matrix(self) -> bool:  # type: ignore[override]
         """Whether all summands do."""
         return all(material.needs_matrix for material in self.summands)
+
+    @property
+    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The axes that some summand feels."""
+        return tuple(sorted({axis for material in self.summands for axis in material.felt_axes}))
+
+    @property
+    def shears(self) -> bool:  # type: ignore[override]
+        """Whether some summand does."""
+        return any(material.shears for material in self.summands)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode, Path, SimpleShear, States
 from tissuq.experiments.modes.path import STEP, UNMEASURED, Deformation
+from tissuq.mechanics.equilibrium import energy_in_equilibrium, has_free_axis
 from tissuq.mechanics.material import Material
 
 __all__ = [
@@ -41,7 +42,7 @@ AGREEMENT = 1e-5
 
 def path_energy(material: Material, path: Path, point: Any, values: Any, step: Any = 0.0) -> Any:
     """Return the strain energy (MPa) of a material a step further than a point of a path; JAX differentiates it."""
-    return material.energy_of(path.moved(point, step), values)
+    return energy_in_equilibrium(material, path.moved(point, step), values)
 
 
 def engineering_stress(
@@ -137,7 +138,7 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     Raises
     ------
     ModelError
-        When there is not one value for each nonlinear parameter.
+        When there is not one value for each nonlinear parameter, or the stress is not linear in the others.
 
     Examples
     --------
@@ -149,6 +150,7 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     settings = np.asarray(nonlinear, dtype=np.float64)
     rows = np.atleast_2d(settings)
     _check_nonlinear(material, rows.shape[1:])
+    _check_deformations(material, states)
     curves = complex_step_stress(material, states, material.unit_values(rows).reshape(-1, len(material.parameters)))
     if curves is None:
         curves = _scattered(states, lambda path, points: _bases(material, path)(points, rows))
@@ -159,9 +161,11 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
 def stresses_by_basis(material: Material, states: States, values: FloatArray) -> FloatArray:
     """Return the stresses (m, n) at states (n,) for parameter values (m, k), not finite where there are none.
 
-    As sums over `stress_basis`, of a few values at a time, as derivatives like them.
+    As sums over `stress_basis`, of a few values at a time, as derivatives like them, where these are linear.
     """
     is_linear = material.linear_mask
+    if is_linear.sum() > 1 and has_free_axis(material, states):
+        return _any_stresses(material, states, values)
     if is_linear.all():
         return np.asarray(values @ stress_basis(material, states).T)
     count = max(1, MAX_COMPLEX_STEP_VALUES // (len(states) * int(is_linear.sum())))
@@ -174,6 +178,7 @@ def stresses_by_basis(material: Material, states: States, values: FloatArray) ->
 def traced_stress_basis(material: Material, states: States, nonlinear: Any) -> Any:
     """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
     _check_nonlinear(material, np.shape(nonlinear))
+    _check_deformations(material, states)
     jnp = differentiator().numpy
     is_linear = material.linear_mask
     values = jnp.asarray(np.eye(is_linear.size)[is_linear]).at[:, ~is_linear].set(nonlinear)
@@ -219,7 +224,7 @@ def complex_step_stress(material: Material, states: States, values: FloatArray) 
 
 def _energy_at(material: Material, states: States, step: Any, values: FloatArray) -> Any:
     moved = _moved if len(states) <= VALUES_AT_ONCE else States.moved
-    return material.energy_of(moved(states, step), values.T[:, :, None])
+    return energy_in_equilibrium(material, moved(states, step), values.T[:, :, None])
 
 
 def _complex_step_slopes(material: Material, states: States, values: FloatArray) -> FloatArray | None:
@@ -256,6 +261,15 @@ def _read_only(component: Any) -> Any:
     view = component.view()
     view.flags.writeable = False
     return view
+
+
+def _check_deformations(material: Material, states: States) -> None:
+    """Refuse states at which the stress is no sum over parameters."""
+    if not material.felt_axes:
+        return
+    for path, points in zip(states.paths, states.points, strict=True):
+        if problem := material.why_not(path.moved(points[:1], 0.0)):
+            raise ModelError(problem)
 
 
 def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:

@@ -15,6 +15,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.rays import Range
+from tissuq.mechanics.relative_stiffness import for_states
 from tissuq.model.compatibility import check_angles, check_linearity, check_parts, check_separable
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
 from tissuq.model.discrepancy.blocks import EnergyBlock
@@ -51,7 +52,7 @@ class StatisticalModel(ErrorModel):
     experiment : Experiment
         The measurements.
     material : Material
-        The model whose parameters are wanted.
+        The model whose parameters are wanted; in parameters in which its stress is linear on this experiment.
     discrepancy : Discrepancy
         What it cannot explain; the model holds it as adapted to material and experiment.
     noise : float, str or Noise
@@ -86,6 +87,7 @@ class StatisticalModel(ErrorModel):
         if known_statistics is not None:
             self.__dict__["statistics"] = known_statistics
         object.__setattr__(self, "experiment", Experiment.of(self.experiment))
+        object.__setattr__(self, "material", for_states(self.material, self.experiment.states))
         object.__setattr__(self, "noise", noise_named(self.noise))
         object.__setattr__(self, "discrepancy", self.discrepancy.adapted_to(self.material, self.experiment))
         check_parts(self.material, self.discrepancy, self.noise, self.tolerances, self.experiment)
@@ -105,6 +107,11 @@ class StatisticalModel(ErrorModel):
             p.symbol: self._chosen_prior(p) or boxes.get(p.symbol) or default_prior(p, self.experiment)
             for p in self.parameters
         }
+
+    @cached_property
+    def derived_parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the material in the literature that follow from those of the model."""
+        return tuple(p for p in self.material.plain.parameters if p.symbol not in self.material_symbols)
 
     @property
     def symbols(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.mechanics import Material, material_named
+from tissuq.mechanics.relative_stiffness import for_states
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import KnownNoise, KnownNoises, Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
@@ -41,7 +42,7 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
     plain = {
         "material": material.name,
         "material_symbols": list(model.material_symbols),
-        "is_own_material": not _gives(lambda: material_named(material.name), material),
+        "is_own_material": not _gives(lambda: for_states(material_named(material.name), experiment.states), material),
         "discrepancy": discrepancy.name,
         "is_own_discrepancy": not _gives(
             lambda: discrepancy_named(discrepancy.name).adapted_to(material, experiment), discrepancy
@@ -92,6 +93,11 @@ def _recorded_model(
     group = groups[MODEL]
     plain = json.loads(group.attrs["settings"])
     law = _named("material", plain["material"], None if plain["is_own_material"] else material_named, material)
+    tests = [
+        _test(groups[f"{TESTS}/{number}"]) for number in range(sum(name.startswith(f"{TESTS}/") for name in groups))
+    ]
+    experiment = Experiment.of(tests)
+    law = for_states(law, experiment.states)
     if [parameter.symbol for parameter in law.parameters] != plain["material_symbols"]:
         raise InputError(
             f"the material '{plain['material']}' of this posterior has the parameters "
@@ -100,11 +106,8 @@ def _recorded_model(
     error = _named(
         "discrepancy", plain["discrepancy"], None if plain["is_own_discrepancy"] else discrepancy_named, discrepancy
     )
-    tests = [
-        _test(groups[f"{TESTS}/{number}"]) for number in range(sum(name.startswith(f"{TESTS}/") for name in groups))
-    ]
     model = StatisticalModel(
-        Experiment.of(tests),
+        experiment,
         law,
         error,
         noise_named(plain["noise"]),

@@ -171,7 +171,8 @@ def _materials(solution: Solution, count: int, seed: list[int], sampling: Sampli
     for number, (row, energy) in enumerate(zip(values, energies, strict=True)):
         parameters = dict(zip(model.symbols, map(float, row), strict=True))
         extra_term = model.discrepancy.material_part(parameters)
-        base_term = model.material, tuple(parameters[symbol] for symbol in model.material_symbols)
+        of_material = tuple(parameters[symbol] for symbol in model.material_symbols)
+        base_term = model.material.plain, tuple(model.material.plain_values(of_material))
         terms = (base_term, extra_term) if extra_term else (base_term,)
         draws.append(EnergyDraw(number, terms, energy, None, float(beyond_scores[number]), float(factor[number])))
     return _continued(model, draws, points.member, scores(probability)) if points.member is not None else draws

@@ -22,8 +22,9 @@ from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loa
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, StretchMaterial
 from tissuq.mechanics.draws import Continuation, PiecewiseEnergy, sum_of_energies
+from tissuq.mechanics.equilibrium import has_free_axis
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
-from tissuq.mechanics.stress import stresses_by_basis
+from tissuq.mechanics.stress import stresses_at, stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.pictures.prediction import curves
 
@@ -102,7 +103,19 @@ class EnergyDraw(StretchMaterial):
         energy = sum(material.energy_of(deformation, parameters) for material, parameters in self.parts)
         return energy if self.discrepancy is None else energy + self.discrepancy(deformation.stretches)
 
+    @property
+    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The axes that some part feels."""
+        return tuple(sorted({axis for material, _ in self.parts for axis in material.felt_axes}))
+
+    @property
+    def shears(self) -> bool:  # type: ignore[override]
+        """Whether some part does."""
+        return any(material.shears for material, _ in self.parts)
+
     def why_not(self, deformation: Deformation) -> str:
+        if deformation.has_free_axis and not self.shears:
+            return ""
         return next(filter(None, (material.why_not(deformation) for material, _ in self.parts)), "")
 
 
@@ -239,7 +252,7 @@ class Ensemble(Sequence[EnergyDraw]):
         """Return how the draws' parameters spread as a table, which notebooks show."""
         import pandas as pd
 
-        is_stress = {parameter.symbol: bool(parameter.unit) for parameter in self.model.material.parameters}
+        is_stress = {parameter.symbol: bool(parameter.unit) for parameter in self.model.material.plain.parameters}
         unit = stress_unit(self.model.experiment.stress_unit)
         table = pd.DataFrame([draw.values for draw in self.draws])
         table = table.div([unit.to_mpa if is_stress[str(name)] else 1.0 for name in table])
@@ -268,6 +281,8 @@ def stress_of(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
 
 def stress_within(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
     """Return the stresses (N, n) of draws at states (n,) in the range of their data."""
+    if has_free_axis(draws[0], states):  # of all parts together
+        return np.array([stresses_at(draw, states, ()) for draw in draws])
     stresses = np.zeros((len(draws), len(states)))
     for term, (material, _) in enumerate(draws[0].parts):
         stresses += stresses_by_basis(material, states, np.array([draw.parts[term][1] for draw in draws]))

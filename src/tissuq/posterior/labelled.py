@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment import known_evidence_changes
-from tissuq.assessment.modulus import modulus
+from tissuq.assessment.modulus import derived_marginal, modulus
 from tissuq.errors import InputError
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
@@ -34,7 +34,8 @@ def labelled_arrays(
     chains, draws = (np.arange(size) for size in solution.shape)
     sample = {"chain": chains, "draw": draws}
     thinned_sample = {"chain": chains, "draw": draws[:: stride(solution)]}
-    parameters = {parameter.symbol: parameter for parameter in solution.model.parameters}
+    model = solution.model
+    parameters = {parameter.symbol: parameter for parameter in (*model.parameters, *model.derived_parameters)}
     scales = {symbol: unit.to_mpa if parameter.unit else 1.0 for symbol, parameter in parameters.items()}
     in_stress, of_mpa = {"units": unit.name}, {"density_of": "stresses in MPa"}
     coordinates = {"stretch": ("measurement", experiment.states.abscissa, {"units": "1"})}
@@ -122,10 +123,11 @@ def summaries(
     """Return mean, sd, median and interval of the parameters that are asked for, in MPa; see `Posterior.summary`."""
     model = solution.model
     check_probability(prob)
-    wanted = model.symbols if parameters is None else tuple(parameters)
-    unknown = [symbol for symbol in wanted if symbol not in model.symbols]
+    symbols = (*model.symbols, *(parameter.symbol for parameter in model.derived_parameters))
+    wanted = symbols if parameters is None else tuple(parameters)
+    unknown = [symbol for symbol in wanted if symbol not in symbols]
     if unknown:
-        raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(model.symbols)}.")
+        raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(symbols)}.")
     return {symbol: _numbers(solution, symbol, prob) for symbol in wanted}
 
 
@@ -133,7 +135,8 @@ def summaries_in(
     unit: StressUnit, solution: Solution, prob: float = 0.95, parameters: Sequence[str] | None = None
 ) -> dict[str, dict[str, float]]:
     """Return `summaries` with parameters that are stresses in a unit."""
-    scales = {parameter.symbol: unit.to_mpa if parameter.unit else 1.0 for parameter in solution.model.parameters}
+    model = solution.model
+    scales = {p.symbol: unit.to_mpa if p.unit else 1.0 for p in (*model.parameters, *model.derived_parameters)}
     return {
         symbol: {name: value / scales[symbol] if name in OF_VALUES else value for name, value in numbers.items()}
         for symbol, numbers in summaries(solution, prob, parameters).items()
@@ -142,7 +145,9 @@ def summaries_in(
 
 def _numbers(solution: Solution, symbol: str, prob: float) -> dict[str, float]:
     """Return mean and sd (nan where there may be none), median, ends of the interval, and how well it is sampled."""
-    marginal, model, diagnostics = solution.marginals[symbol], solution.model, solution.diagnostics
+    model, is_derived = solution.model, symbol not in solution.model.symbols
+    marginal = derived_marginal(solution, symbol) if is_derived else solution.marginals[symbol]
+    diagnostics = None if is_derived else solution.diagnostics
     has_moments = symbol not in model.energy_symbols or model.priors[symbol].has_moments
     mean, sd = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
     low, high = marginal.hdi(prob)
@@ -155,9 +160,15 @@ def _numbers(solution: Solution, symbol: str, prob: float) -> dict[str, float]:
 
 def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:
     """Return the draws of every parameter, those of stresses with the error that all tests have in common."""
-    model, drawn = solution.model, solution.draws
-    if not model.common_error:
+    model, drawn = solution.model, dict(solution.draws)
+    if model.common_error:
+        score = np.random.default_rng([seed, 19]).standard_normal(solution.shape)
+        factor = 1 + model.common_error * score
+        drawn = {
+            symbol: values * (factor if symbol in model.column_symbols else 1.0) for symbol, values in drawn.items()
+        }
+    if not model.derived_parameters:
         return drawn
-    score = np.random.default_rng([seed, 19]).standard_normal(solution.shape)
-    factor = 1 + model.common_error * score
-    return {symbol: values * (factor if symbol in model.column_symbols else 1.0) for symbol, values in drawn.items()}
+    plain_values = model.material.plain_values([drawn[symbol] for symbol in model.material_symbols])
+    plain = {p.symbol: values for p, values in zip(model.material.plain.parameters, plain_values, strict=True)}
+    return drawn | plain

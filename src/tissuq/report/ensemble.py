@@ -212,7 +212,7 @@ def _draw_rows(study: EnsembleStudy) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"draw": number + 1}
         for material, ensemble in ensembles.items():
             prefix = f"{material}." if len(ensembles) > 1 else ""
-            for parameter in ensemble.model.material.parameters:
+            for parameter in ensemble.model.material.plain.parameters:
                 value, heading = ensemble[number].values[parameter.symbol], f"{prefix}{parameter.symbol}"
                 row |= {f"{heading} [{unit.name}]": value / unit.to_mpa} if parameter.unit else {heading: value}
         for name in result.curves:

@@ -100,14 +100,16 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
     for formulation, posterior in posteriors.items():
         unit = posterior.unit()
         table = summaries_in(unit, posterior.solution)
-        for parameter in posterior.model.parameters:
-            numbers, prior = table[parameter.symbol], posterior.model.priors[parameter.symbol]
+        model = posterior.model
+        priors = {p.symbol: model.priors[p.symbol].scaled(1 / unit.to_mpa if p.unit else 1.0) for p in model.parameters}
+        for parameter in (*model.parameters, *model.derived_parameters):
+            numbers = table[parameter.symbol]
             rows.append(
                 {
                     "formulation": formulation,
                     "parameter": parameter.symbol,
                     "unit": unit.name if parameter.unit else "",
-                    "prior": str(prior.scaled(1 / unit.to_mpa) if parameter.unit else prior),
+                    "prior": str(priors.get(parameter.symbol, "follows from the others")),
                     **{name: known_number(numbers[name]) for name in ("mean", "sd", "median", "hdi_low", "hdi_high")},
                     "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
                     "ess": float(numbers["ess"]) if "ess" in numbers else None,

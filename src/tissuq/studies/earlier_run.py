@@ -276,7 +276,7 @@ def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior]
     to_mpa = stress_unit(unit).to_mpa
     priors: dict[str, Prior] = {}
     lines = []
-    for parameter in posterior.model.material.parameters:
+    for parameter in posterior.model.material.plain.parameters:
         symbol, (low, high) = parameter.symbol, parameter.support
         scale = to_mpa if parameter.unit else 1.0
         values = np.asarray(draws[symbol], dtype=np.float64).ravel() / scale

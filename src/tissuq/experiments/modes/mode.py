@@ -14,7 +14,7 @@ from tissuq.errors import ModelError
 from tissuq.experiments.modes.path import Deformation, Path, States
 from tissuq.registry import find, variants
 
-__all__ = ["SHEAR", "STRETCH", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes"]
+__all__ = ["SHEAR", "STRETCH", "AlongAxis2", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes"]
 
 WORDS_FOR_MODES = {
     "tension": "uniaxial",
@@ -63,6 +63,8 @@ class LoadingMode(ABC):
     """What is measured, in the order of `paths`."""
     machine_axes: ClassVar[tuple[str, ...]] = ()
     """What the axes of the stresses are called in the file of a biaxial machine, where the mode is of such a test."""
+    has_axis: ClassVar[bool] = False
+    """Whether a specimen may be cut along axis 2 of the tissue, too: `AlongAxis2`."""
 
     @abstractmethod
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
@@ -142,6 +144,37 @@ class ControlPath(Path):
         return self.mode.deformation(point + step)
 
 
+@dataclass(frozen=True)
+class AlongAxis2(LoadingMode):
+    """A mode of one stretch with a specimen that was cut along axis 2 of the tissue, not along axis 1.
+
+    Attributes
+    ----------
+    mode : LoadingMode
+        That of a specimen along axis 1.
+    """
+
+    mode: LoadingMode
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """The name of the mode, and of the axis."""
+        return f"{self.mode.name}@2"
+
+    @property
+    def description(self) -> str:  # type: ignore[override]
+        """That of the mode, and the axis."""
+        return f"{self.mode.description}, of a specimen along axis 2 of the tissue"
+
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return self.deformation(point).stretches
+
+    def deformation(self, point: Any) -> Deformation:
+        of_axis_1 = self.mode.deformation(point)
+        (stretch_1, stretch_2, stretch_3), (c11, c22, c12) = of_axis_1.stretches, of_axis_1.plane
+        return Deformation((stretch_2, stretch_1, stretch_3), (c22, c11, c12))
+
+
 def loading_modes() -> dict[str, type[LoadingMode]]:
     """Return every loading mode by name."""
     return variants(LoadingMode)
@@ -155,6 +188,8 @@ def curve_modes() -> list[LoadingMode]:
 def loading_mode(mode: str | LoadingMode) -> LoadingMode:
     """Return the loading mode of that name; a mode is returned as it is.
 
+    A specimen that was cut along axis 2 of the tissue has ``@2`` after the name, as in ``uniaxial@2``.
+
     Raises
     ------
     ModelError
@@ -162,10 +197,24 @@ def loading_mode(mode: str | LoadingMode) -> LoadingMode:
     """
     if isinstance(mode, LoadingMode):
         return mode
+    name, _, axis = str(mode).partition("@")
+    along_axis_1 = _mode_named(name)
+    if not axis:
+        return along_axis_1
+    if axis not in ("1", "2") or not along_axis_1.has_axis:
+        having = " or ".join(f"{name}@2" for name, kind in loading_modes().items() if kind.has_axis)
+        raise ModelError(
+            f"there is no loading mode named '{mode}': after @ stands axis 1 or 2 of the tissue, along which a "
+            f"specimen was cut, as in {having}."
+        )
+    return along_axis_1 if axis == "1" else AlongAxis2(along_axis_1)
+
+
+def _mode_named(mode: str) -> LoadingMode:
     try:
         return find(LoadingMode, "loading mode", mode, ModelError)()
     except ModelError as error:
-        word = str(mode).strip().lower().replace("_", "-").replace(" ", "-")
+        word = mode.strip().lower().replace("_", "-").replace(" ", "-")
         if word not in WORDS_FOR_MODES:
             raise
         raise ModelError(f"{error} For {word} take '{WORDS_FOR_MODES[word]}'.") from error

@@ -17,11 +17,13 @@ __all__ = ["Equibiaxial", "Planar", "SimpleShear", "SimpleShearNormal", "Uniaxia
 class Uniaxial(LoadingMode):
     """Tension or compression along one axis: F = diag(l, l^-1/2, l^-1/2).
 
-    The lateral stretches are equal because the material is isotropic, or symmetric about the axis.
+    The lateral stretches are equal if the material is isotropic, or symmetric about the axis; else they follow from its
+    parameters, as no lateral stress acts. A specimen along axis 2 of the tissue is `uniaxial@2`.
     """
 
     name = "uniaxial"
     description = "tension or compression along one axis"
+    has_axis = True
 
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
         lateral = point**-0.5
@@ -57,6 +59,7 @@ class Planar(LoadingMode):
 
     name = "planar"
     description = "planar tension (pure shear), one lateral axis held"
+    has_axis = True
 
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
         return point, 1.0, 1.0 / point

@@ -40,6 +40,11 @@ class Deformation:
     stretches: tuple[Any, Any, Any]
     plane: tuple[Any, Any, Any]
 
+    @property
+    def has_free_axis(self) -> bool:
+        """Whether the test leaves one axis of the plane to the material, without stress along it."""
+        return sum(component is None for component in self.plane[:2]) == 1
+
     @classmethod
     def along_axes(cls, stretches: tuple[Any, Any, Any]) -> Deformation:
         """Return the deformation whose principal axes are those of the test."""

@@ -105,9 +105,19 @@ class FibreMaterial(Material):
             return ""
         return (
             f"material '{self.name}' has fibres, and this loading mode says how the specimen deforms only of an "
-            "isotropic material: give both stresses of 'biaxial' instead of 'equibiaxial'; 'uniaxial' is for one "
-            "family along the axis (:one@0), as otherwise the lateral stretches differ and depend on the parameters."
+            "isotropic material: give both stresses of 'biaxial' instead of 'equibiaxial'; 'uniaxial' is for two "
+            "families in a matrix, or for one along an axis (:one@0 or :one@90), as one at an angle shears, too."
         )
+
+    @property
+    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The axis of the fibres where they lie along one, else both."""
+        return (0,) if self._is_along_axis else (0, 1)
+
+    @property
+    def shears(self) -> bool:  # type: ignore[override]
+        """Whether there is one family that lies along no axis, or may do so."""
+        return self.families == 1 and self.degrees not in (0, 90)
 
     @property
     def _is_along_axis(self) -> bool:

@@ -1,0 +1,126 @@
+"""Fibres whose stiffness is a multiple of that of their matrix, for tests that leave a lateral stretch to the material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from tissuq.experiments.modes import Deformation, States
+from tissuq.mechanics.equilibrium import has_free_axis
+from tissuq.mechanics.material import Material, MaterialSum
+from tissuq.parameters.parameter import Parameter
+from tissuq.parameters.priors import LogUniform
+
+__all__ = ["RelativeStiffness", "for_states"]
+
+RATIO = LogUniform(0.01, 1000.0)
+"""The default prior of the stiffness of fibres over that of the matrix."""
+
+
+@dataclass(frozen=True)
+class RelativeStiffness(Material):
+    """A sum in which one stiffness is that of the matrix, and those of the fibres are multiples of it.
+
+    The lateral stretch of a uniaxial test depends on the ratios of the stiffnesses, so that the stress is proportional
+    to one of them where the others are given as multiples of it.
+
+    Parameters
+    ----------
+    material : MaterialSum
+    """
+
+    material: MaterialSum
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """That of the sum."""
+        return self.material.name
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """That of the sum."""
+        return self.material.formula
+
+    @property
+    def source(self) -> str:  # type: ignore[override]
+        """That of the sum."""
+        return self.material.source
+
+    @property
+    def caution(self) -> str:  # type: ignore[override]
+        """That of the sum."""
+        return self.material.caution
+
+    is_isotropic = False
+
+    @property
+    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Those of the sum."""
+        return self.material.felt_axes
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        """Those of the sum, the stiffnesses of fibres as ratios."""
+        matrix = self.material.parameters[self._matrix].symbol
+        return tuple(
+            replace(
+                parameter,
+                symbol=f"{parameter.symbol}_over_{matrix}",
+                description=f"{parameter.description}, over {matrix}",
+                dimension="number",
+                is_linear=False,
+                relative_prior=RATIO,
+            )
+            if number in self._ratios
+            else parameter
+            for number, parameter in enumerate(self.material.parameters)
+        )
+
+    @property
+    def _matrix(self) -> int:
+        return _stiffnesses(self.material)[0][0]
+
+    @property
+    def _ratios(self) -> list[int]:
+        return _stiffnesses(self.material)[1]
+
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
+        return self.material.strain_energy(I1, I2, self.plain_values(values))
+
+    def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
+        return self.material.energy(stretches, self.plain_values(values))
+
+    def energy_of(self, deformation: Deformation, values: Any) -> Any:
+        return self.material.energy_of(deformation, self.plain_values(values))
+
+    def why_not(self, deformation: Deformation) -> str:
+        return "" if deformation.has_free_axis else self.material.why_not(deformation)
+
+    @property
+    def plain(self) -> Material:
+        """The sum."""
+        return self.material
+
+    def plain_values(self, values: Any) -> list[Any]:
+        """Return the values (k, ...) of the sum."""
+        return [value * values[self._matrix] if n in self._ratios else value for n, value in enumerate(values)]
+
+
+def for_states(material: Material, states: States) -> Material:
+    """Return a material in parameters of which one is a stiffness, if its lateral stretch at states depends on others.
+
+    Else, and where its matrix has several stiffnesses, the material as it is.
+    """
+    if not isinstance(material, MaterialSum) or material.shears or len(_stiffnesses(material)[0]) != 1:
+        return material
+    return RelativeStiffness(material) if has_free_axis(material, states) else material
+
+
+def _stiffnesses(material: MaterialSum) -> tuple[list[int], list[int]]:
+    """Return which parameters are stiffnesses of the matrix, and which of fibres."""
+    numbers = material.shares(range(len(material.parameters)))
+    matrix, fibres = (
+        [n for part, its in numbers for n in its if part.is_isotropic == is_matrix and material.linear_mask[n]]
+        for is_matrix in (True, False)
+    )
+    return matrix, fibres
