@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from tissuq.experiments.modes import Deformation, States
@@ -58,31 +59,28 @@ class RelativeStiffness(Material):
         """Those of the sum."""
         return self.material.felt_axes
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         """Those of the sum, the stiffnesses of fibres as ratios."""
-        matrix = self.material.parameters[self._matrix].symbol
+        [matrix], ratios = self._stiffnesses
+        symbol = self.material.parameters[matrix].symbol
         return tuple(
             replace(
                 parameter,
-                symbol=f"{parameter.symbol}_over_{matrix}",
-                description=f"{parameter.description}, over {matrix}",
+                symbol=f"{parameter.symbol}_over_{symbol}",
+                description=f"{parameter.description}, over {symbol}",
                 dimension="number",
                 is_linear=False,
                 relative_prior=RATIO,
             )
-            if number in self._ratios
+            if number in ratios
             else parameter
             for number, parameter in enumerate(self.material.parameters)
         )
 
-    @property
-    def _matrix(self) -> int:
-        return _stiffnesses(self.material)[0][0]
-
-    @property
-    def _ratios(self) -> list[int]:
-        return _stiffnesses(self.material)[1]
+    @cached_property
+    def _stiffnesses(self) -> tuple[list[int], list[int]]:
+        return _stiffnesses(self.material)
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         return self.material.strain_energy(I1, I2, self.plain_values(values))
@@ -103,7 +101,8 @@ class RelativeStiffness(Material):
 
     def plain_values(self, values: Any) -> list[Any]:
         """Return the values (k, ...) of the sum."""
-        return [value * values[self._matrix] if n in self._ratios else value for n, value in enumerate(values)]
+        [matrix], ratios = self._stiffnesses
+        return [value * values[matrix] if number in ratios else value for number, value in enumerate(values)]
 
 
 def for_states(material: Material, states: States) -> Material:
