@@ -220,6 +220,7 @@ class Assessment:
 def assess(
     solution: Solution,
     solve: Solve,
+    solve_alike: Solve,
     ranges: Mapping[str, StableRange],
 ) -> Assessment:
     """Return the effect of the discrepancy on a posterior.
@@ -228,8 +229,10 @@ def assess(
     ----------
     solution : Solution
     solve : callable
-        Returns the solutions of models by the method that gave this one: for the same model without discrepancy, and
-        with other prior scales of the discrepancy.
+        Returns the solutions of models: for the same one without discrepancy.
+    solve_alike : callable
+        Returns them, near enough to see a shift, by the method that gave this one: for other prior scales of the
+        discrepancy.
     ranges : mapping of str to StableRange
         Stable range by loading mode.
     """
@@ -241,8 +244,8 @@ def assess(
     scales = scale_symbols(model)
     is_rescaled = bool(scales) and solution.diagnostics is None
     likely = at_level(model)  # where the noise would be summed over, other priors are tried at its level
-    reference = solve([likely])[0] if is_rescaled and likely is not model else solution
-    rescaled_solutions = _rescaled(likely, solve) if is_rescaled else {}
+    reference = solve_alike([likely])[0] if is_rescaled and likely is not model else solution
+    rescaled_solutions = _rescaled(likely, solve_alike) if is_rescaled else {}
     expected = reference.marginals[model.headline].mean
     return Assessment(
         parameter=model.headline,

@@ -40,7 +40,7 @@ def modulus(solution: Solution) -> Marginal:
 
 
 def derived_marginal(solution: Solution, symbol: str) -> Marginal:
-    """Return the marginal posterior of one of the model's `derived_parameters`, which is proportional to a linear one."""
+    """Return the marginal posterior of one of the model's `derived_parameters`, a ratio times a linear parameter."""
     model, mixture = solution.model, solution.mixture
     number = [parameter.symbol for parameter in model.material.plain.parameters].index(symbol)
     units = model.material.unit_values(values_of(model, mixture, model.bent_symbols)[0])  # (M, p, k)

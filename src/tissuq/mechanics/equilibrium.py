@@ -87,7 +87,7 @@ def _completed(deformation: Deformation, is_open: list[Any], logarithm: Any) -> 
 
 
 def _logarithm_in_numpy(material: Material, deformation: Deformation, is_open: list[Any], values: Any) -> Any:
-    real = Deformation(*(tuple(_real(c) for c in part) for part in (deformation.stretches, deformation.plane)))  # type: ignore[arg-type]
+    real = Deformation(*(tuple(_real(c) for c in part) for part in (deformation.stretches, deformation.plane)))
 
     def lateral_stress(logarithm: Any) -> Any:
         energy = material.energy_of(_completed(real, is_open, logarithm + 1j * STEP), values)
@@ -114,8 +114,8 @@ def _logarithm_in_jax(material: Material, deformation: Deformation, is_open: lis
         return jvp(energy, (logarithm,), (library(logarithm).ones_like(logarithm),))[1]
 
     ends = lax.stop_gradient(_ends(deformation, is_open))
-    ends = lax.fori_loop(0, HALVINGS, lambda _, ends: _halved(*ends, lateral_stress), ends)
-    logarithm = lax.stop_gradient(_refined(*ends, lateral_stress))
+    ends = lax.fori_loop(0, HALVINGS, lambda _, ends: _halved(ends[0], ends[1], lateral_stress), ends)
+    logarithm = lax.stop_gradient(_refined(ends[0], ends[1], lateral_stress))
     slope = (lateral_stress(logarithm + NEWTON_STEP) - lateral_stress(logarithm)) / NEWTON_STEP
     return logarithm - lateral_stress(logarithm, still=False) / slope
 

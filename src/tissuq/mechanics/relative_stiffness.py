@@ -1,4 +1,4 @@
-"""Fibres whose stiffness is a multiple of that of their matrix, for tests that leave a lateral stretch to the material."""
+"""Fibres whose stiffness is a multiple of that of their matrix, for tests with free sides."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics.equilibrium import has_free_axis
 from tissuq.mechanics.stress import stresses_at
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
@@ -41,15 +42,22 @@ def check_parts(
     InputError
         When there is not one known noise for each test, or the noise needs one test, with repeats.
     """
-    _check_modes(material, experiment)
+    _check_modes(material, discrepancy, experiment)
     _check_parameters(material, discrepancy)
     _check_errors(discrepancy, noise, tolerances, experiment)
 
 
-def _check_modes(material: Material, experiment: Experiment) -> None:
+def _check_modes(material: Material, discrepancy: Discrepancy, experiment: Experiment) -> None:
     for curve in experiment.curves:
         if problem := material.why_not(curve.path.moved(curve.points[:1], 0.0)):
             raise ModelError(problem)
+        is_further_energy = discrepancy.is_energy and bool(discrepancy.parameters)
+        if is_further_energy and has_free_axis(material, curve.path.at(curve.points[:1])):
+            raise ModelError(
+                f"in test '{curve.name}' ({curve.mode.name}) the lateral stretch of '{material.name}' would depend on "
+                f"the discrepancy '{discrepancy.name}', too, which is an energy: choose one that is an error of the "
+                "measured stress (--discrepancy gp-pinned), or --discrepancy none."
+            )
 
 
 def _check_parameters(material: Material, discrepancy: Discrepancy) -> None:

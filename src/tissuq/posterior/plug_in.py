@@ -96,7 +96,7 @@ class ErrorEstimates:
         has_several = len(model.experiment.tests) > 1
         if not (has_several and (model.tolerances.stress or model.tolerances.test) and self._has_evidence(model)):
             return model
-        simpler, have_one_path = model.discrepancy.of_contradictory_tests, _have_one_path(model.experiment)
+        simpler, have_one_path = model.discrepancy.of_contradictory_tests, _have_one_path(model)
         if simpler is None and not have_one_path:
             return model
         model = self._with_curve(model)
@@ -324,11 +324,12 @@ def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tol
     return tolerances.with_sizes(**{MeanError.name: 1.0})
 
 
-def _have_one_path(experiment: Experiment) -> bool:
-    """Return whether all tests follow one path from the reference, or its opposite."""
+def _have_one_path(model: StatisticalModel) -> bool:
+    """Return whether all tests follow one path of the material from the reference, or its opposite."""
     farthest = []
-    for test in experiment.tests:
-        logs = np.concatenate([path.at(test.stretch).log_stretches[0] for path in test.mode.paths])
+    for test in model.experiment.tests:
+        mode = test.mode.along_axis_1 if model.material.is_isotropic else test.mode
+        logs = np.concatenate([path.at(test.stretch).log_stretches[0] for path in mode.paths])
         sizes = np.linalg.norm(logs, axis=1)
         farthest.append(logs[sizes.argmax()] / sizes.max())
     return bool((np.abs(np.array(farthest) @ farthest[0]) > MIN_PATH_COSINE).all())

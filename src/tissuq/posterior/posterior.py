@@ -180,7 +180,8 @@ class Posterior(PosteriorPlots):
 
     @cached_property
     def _assessment(self) -> Assessment:
-        return assess(self.solution, self.solver.solve, self.stable_ranges)
+        alike = self.solver if self.diagnostics is not None else self.solver.for_checks
+        return assess(self.solution, self.solver.solve, alike.solve, self.stable_ranges)
 
     def stability(
         self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -41,11 +41,19 @@ class Solver:
         Loading modes in which what is not stable is left out.
     seed : int
         Of the draws.
+    accuracy : Accuracy
+        Of importance points.
     """
 
     method: Method = "auto"
     stable_in: tuple[str, ...] = ()
     seed: int = 0
+    accuracy: Accuracy = FINE
+
+    @property
+    def for_checks(self) -> Solver:
+        """The same solver for models near one that it solved without sampling: fewer points, and no sampling."""
+        return replace(self, method="exact", accuracy=ROUGH)
 
     def solve(self, models: Sequence[StatisticalModel]) -> list[Solution]:
         """Return the posteriors of models on the same stretches."""
@@ -127,7 +135,7 @@ class Solver:
             return AmplitudeLattice()
         if (refusal := AdaptedPoints.why_not(model)) and self.method == "auto":
             return _sampler("nuts", refusal)
-        return AdaptiveCells() if refusal or _suits_cells(model) else AdaptedPoints()
+        return AdaptiveCells() if refusal or _suits_cells(model) else AdaptedPoints(self.accuracy)
 
 
 def _sampler(method: Method, refusal: str = "") -> Enumerator:

@@ -76,10 +76,11 @@ def warnings_about(
     if directions := _directions_of_one_fibre(solution.model):
         yield ResultWarning(
             f"the tests are along several directions of the tissue ({directions}), while fibres lie at one angle from "
-            "axis 1 of every test: all directions are taken for one, so that the parameters are of none. Fit the tests "
-            "of each direction by themselves, or give tests with the stresses of both axes.",
+            "axis 1 of every test: these directions are taken for one, so that the parameters are of none. Say which "
+            "tests were along axis 2: {mode}, with the mode of every test.",
             "contradicting-tests",
             Severity.PROBLEM,
+            mode="uniaxial@2",
         )
     if ranges and min(stable_range.probability for stable_range in ranges.values()) < MIN_STABLE_PROBABILITY:
         yield _instability(solution, min(ranges.values(), key=lambda stable_range: stable_range.probability))
@@ -201,9 +202,13 @@ def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
 
 
 def _directions_of_one_fibre(model: StatisticalModel) -> str:
-    """Return the directions of tests with one stress, where there are several and the material has fibres."""
+    """Return directions of tests with one stress along one axis, where they are several and the material has fibres."""
     curves = [curve for curve in model.experiment.curves if len(curve.mode.stresses) == 1 and curve.direction]
-    directions = dict.fromkeys(curve.direction for curve in curves)
+    along_1, along_2 = (
+        dict.fromkeys(curve.direction for curve in curves if (curve.mode.along_axis_1 == curve.mode) == is_first)
+        for is_first in (True, False)
+    )
+    directions = max(along_1, along_2, key=len)
     return "" if model.material.is_isotropic or len(directions) < 2 else ", ".join(directions)
 
 

@@ -138,12 +138,11 @@ def correlated_groups(model: StatisticalModel, settings: FloatArray) -> Iterator
     keys = np.column_stack([np.zeros(len(settings)), *(values[symbol] for symbol in shared)])
     distinct, group = np.unique(keys, axis=0, return_inverse=True)
     unit_size = np.ones(model.experiment.size)
-    for index, row in enumerate(distinct):
+    bent = distinct[:, [1 + shared.index(symbol) for symbol in model.bent_symbols]]
+    for index, (row, design) in enumerate(zip(distinct, _designs(model, bent), strict=True)):
         shared_values = dict(zip(shared, map(float, row[1:]), strict=True))
         members = np.flatnonzero(group.ravel() == index)
         shape = {symbol: shared_values[symbol] for symbol in model.discrepancy.shape_symbols}
-        bent = np.array([shared_values[symbol] for symbol in model.bent_symbols])
-        design = model.design_at(bent) if len(bent) else model.design
         if model.noise.depends_on_level:
             scale = np.sqrt(model.white_variance(shared_values, model.levels))
             spectrum, white = scaled_spectrum(model, shape, scale), np.ones(len(members))
@@ -152,6 +151,12 @@ def correlated_groups(model: StatisticalModel, settings: FloatArray) -> Iterator
             member_values = {symbol: column[members] for symbol, column in values.items()}
             white = np.broadcast_to(model.white_variance(member_values), len(members)).astype(float)
         yield CorrelatedGroup(members, shape, design, SpectralCovariance(spectrum, scale, amplitude[members], white))
+
+
+def _designs(model: StatisticalModel, bent: FloatArray) -> Iterator[FloatArray]:
+    """Yield the rows of the model's basis at values (M, s) of `bent_symbols`, a few of which are computed together."""
+    for block in np.array_split(bent, max(1, bent.shape[0] * len(model.states) // MAX_STRESSES_AT_ONCE)):
+        yield from model.designs_at(block) if bent.shape[1] else [model.design] * len(block)
 
 
 def stress_moments(

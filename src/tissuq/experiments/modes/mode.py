@@ -112,6 +112,11 @@ class LoadingMode(ABC):
         return np.stack([stress * path.cauchy_ratio(points) for path, stress in zip(self.paths, stresses, strict=True)])
 
     @property
+    def along_axis_1(self) -> LoadingMode:
+        """The same mode of a specimen along axis 1 of the tissue."""
+        return self
+
+    @property
     def is_curve(self) -> bool:
         """Whether it is one stress against one stretch."""
         return self.controls == (STRETCH,) and len(self.stresses) == 1
@@ -165,6 +170,10 @@ class AlongAxis2(LoadingMode):
     def description(self) -> str:  # type: ignore[override]
         """That of the mode, and the axis."""
         return f"{self.mode.description}, of a specimen along axis 2 of the tissue"
+
+    @property
+    def along_axis_1(self) -> LoadingMode:
+        return self.mode
 
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
         return self.deformation(point).stretches

@@ -355,7 +355,7 @@ def read_rows(
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
     check_signs(used, choices, options, shown)
-    if mode.name == Uniaxial.name and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
+    if mode.along_axis_1 == Uniaxial() and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
         used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)

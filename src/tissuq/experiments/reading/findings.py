@@ -321,7 +321,7 @@ def _other_axis(reading: Reading, number: int) -> str:
     table = reading.table
     choice = reading.choices[number]
     axis, _ = on_axis(table.quantities[choice.deformation])
-    if not axis or not isinstance(reading.experiment.mode, Uniaxial):
+    if not axis or not isinstance(reading.experiment.mode.along_axis_1, Uniaxial):
         return ""
     names = enumerate(map(on_axis, table.quantities))
     across = [(column, name) for column, (name_axis, name) in names if name_axis not in ("", axis)]

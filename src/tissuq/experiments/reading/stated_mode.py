@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode, loading_modes
+from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.experiments.reading.headings import NEXT_WORD, STRESS_NOUNS, heading, measure_in, on_lettered_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS
@@ -39,6 +39,8 @@ MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "axial": "uniaxi
 """Words for loading modes beside their names."""
 NAMES_OF_MODES = {"pure-shear": "planar"}
 """Further names of loading modes."""
+AXIS_2 = "@2"
+"""After the name of a mode: of a specimen along axis 2 of the tissue."""
 NAMES_OF_COLUMN = frozenset({"mode", "loading mode", "mode of loading", "deformation mode", "test mode"})
 """Names of a column that tells in which loading mode a row was measured."""
 OF_MACHINE = re.compile(
@@ -223,7 +225,8 @@ def _mode_of_words(text: str) -> str:
     names = dict.fromkeys(loading_modes()) | NAMES_OF_MODES
     for name in sorted(names, key=len, reverse=True):
         if re.search(rf"(^|-){name}($|-)", words):
-            return names[name] or name
+            mode = names[name] or name
+            return f"{mode}{AXIS_2}" if AXIS_2 in text and loading_mode(mode).has_axis else mode
     if CONFINED.search(words):
         raise InputError(
             f"'{text}' says that the specimen was confined, and no loading mode is with walls. If it could widen "

@@ -299,7 +299,7 @@ def _check_modes(path: str | os.PathLike[str], tests: Sequence[TestInFile]) -> N
     """
     silent = [test.name for test in tests if test.reading.mode_source == DEFAULT_SOURCE]
     experiments = [test.reading.experiment for test in tests]
-    are_directions = all(test.direction and isinstance(test.mode, Uniaxial) for test in experiments)
+    are_directions = all(test.direction and isinstance(test.mode.along_axis_1, Uniaxial) for test in experiments)
     if silent and len(silent) < len(tests) and not are_directions:
         raise InputError(
             f"{path}: '{silent[0]}' does not say in which loading mode it was measured, as other tests in the file do. "

@@ -105,8 +105,10 @@ class FibreMaterial(Material):
             return ""
         return (
             f"material '{self.name}' has fibres, and this loading mode says how the specimen deforms only of an "
-            "isotropic material: give both stresses of 'biaxial' instead of 'equibiaxial'; 'uniaxial' is for two "
-            "families in a matrix, or for one along an axis (:one@0 or :one@90), as one at an angle shears, too."
+            "isotropic material: give both stresses of 'biaxial' instead of 'equibiaxial'. In 'uniaxial' the lateral "
+            "stretch depends on the stiffness of the fibres over that of their matrix: such a test is fitted, and "
+            "predicted by a fit that holds one, for two families in a matrix of one stiffness, such as neo-hookean, or "
+            "for one family along an axis (:one@0, :one@90), as one at an angle shears, too."
         )
 
     @property

@@ -88,7 +88,8 @@ class Discrepancy(ABC):
         That between different curves is zero.
         """
         return sum(
-            np.multiply.outer(rows.in_curve(curve), columns.in_curve(curve))
+            np.reshape(rows.in_curve(curve), (-1, 1))
+            * np.reshape(columns.in_curve(curve), (1, -1))
             * self.kernel(curve, rows.abscissa, columns.abscissa, values)
             for curve in range(self.curves)
         )

@@ -148,7 +148,7 @@ def _test(mode: LoadingMode, labels: dict[str, str], rows: pd.DataFrame) -> Expe
 
 def _sides(test: Experiment) -> list[Experiment]:
     """Return tension and compression along one axis as two tests, as they are made; any other test as it is."""
-    if test.mode != Uniaxial():
+    if test.mode.along_axis_1 != Uniaxial():
         return [test]
     is_side = {"tension": test.stretch > 1, "compression": test.stretch < 1}
     sides = {name: rows for name, rows in is_side.items() if np.count_nonzero(rows) >= MIN_POINTS}
