@@ -51,6 +51,27 @@ def expected(files, **options):
     return tq.fit(parts, discrepancy="none", **options)
 
 
+def test_strips_along_both_axes_of_a_tissue_are_fitted_with_fibres(cli, here):
+    truth, stretch = {"C10": 0.01, "k": 0.05}, np.linspace(1.05, 1.4, 8)
+    for mode, file in (("uniaxial", "circ.csv"), ("uniaxial@2", "axial.csv")):
+        test = tq.simulate("neo-hookean+standard-fibres@40", truth, stretch, 5e-4, seed=1, mode=mode)
+        rows = [f"{a!r},{b!r}" for a, b in zip(stretch.tolist(), (1e3 * test.stress).tolist(), strict=True)]
+        (here / file).write_text("\n".join([f"# mode: {mode}", "stretch,stress_kPa", *rows]) + "\n")
+    options = "circ.csv", "axial.csv", "--material", "neo-hookean+standard-fibres@40", "--noise-sd", 0.5
+    refused = cli("fit", *options)
+    assert refused.status == 2
+    assert "--discrepancy gp-pinned" in refused.err
+    said = cli("fit", *options, *ALONE, "--tolerance", "none", "--out", "run")
+    assert (said.status, said.err) == (0, "")
+    with (here / "run" / "parameters.csv").open(newline="") as lines:
+        rows = {row["parameter"]: row for row in csv.DictReader(lines)}
+    assert list(rows) == ["C10", "k_over_C10", "k"]
+    assert (rows["k"]["unit"], rows["k"]["prior"]) == ("kPa", "follows from the others")
+    assert float(rows["k"]["hdi_low"]) < 50 < float(rows["k"]["hdi_high"])
+    card = cli("export", "run", "--format", "febio", "--out", "cards")
+    assert (card.status, card.err) == (0, "")
+
+
 def test_a_folder_is_fitted_with_the_modes_that_files_or_names_say(cli, files, here):
     said = cli("fit", "tests", *ALONE, "--noise-sd", "1.5")
     assert (said.status, said.err) == (0, "")

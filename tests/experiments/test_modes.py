@@ -142,6 +142,24 @@ def test_an_unknown_mode_is_answered_with_the_modes_there_are():
         loading_mode("uniaxal")
 
 
+@pytest.mark.parametrize("name", ["uniaxial", "planar"])
+def test_a_specimen_along_axis_2_is_deformed_as_one_along_axis_1_with_the_axes_exchanged(name):
+    along_1, along_2 = loading_mode(name), loading_mode(f"{name}@2")
+    assert (along_2.name, along_2.along_axis_1, loading_mode(f"{name}@1")) == (f"{name}@2", along_1, along_1)
+    assert along_2 == loading_mode(f"{name}@2") != along_1
+    first, second = (mode.path.moved(1.3, 0.0) for mode in (along_1, along_2))
+    assert second.plane[:2] == first.plane[:2][::-1]
+    assert second.stretches == (first.stretches[1], first.stretches[0], first.stretches[2])
+    assert along_2.is_curve
+    assert along_2.reference == 1.0
+
+
+@pytest.mark.parametrize("name", ["equibiaxial@2", "uniaxial@3", "simple-shear@1"])
+def test_other_modes_and_axes_are_refused_in_words(name):
+    with pytest.raises(ModelError, match=rf"'{name}': after @ stands axis 1 or 2 .* as in uniaxial@2 or planar@2"):
+        loading_mode(name)
+
+
 @pytest.mark.slow
 def test_a_mode_defined_outside_the_package_is_found_by_its_name():
     class Squeeze(LoadingMode):

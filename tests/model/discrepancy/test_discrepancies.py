@@ -77,6 +77,15 @@ def test_the_covariance_is_the_corrected_equation(name):
     np.testing.assert_allclose(covariance(of(name), STRETCH, VALUES), expected, **tolerance)
 
 
+def test_the_covariance_of_several_curves_with_states_of_one_is_that_of_its_own():
+    data = [tq.Experiment(mode, STRETCH, STRETCH) for mode in ("uniaxial", "planar")]
+    states = tq.Experiment.of(data).states
+    process = discrepancy_named("gp").adapted_to(tq.materials()["neo-hookean"](), tq.Experiment.of(data))
+    found = process.correlation(states, Uniaxial().path.at(STRETCH[:3], 0), VALUES)
+    expected = np.exp(-((STRETCH[:, None] - STRETCH[:3]) ** 2) / (2 * 1.3**2))
+    np.testing.assert_allclose(found, np.concatenate([expected, np.zeros_like(expected)]), rtol=1e-14)
+
+
 @EVERY
 def test_there_is_one_column_for_each_linear_parameter(name):
     discrepancy = discrepancy_named(name)
