@@ -132,10 +132,10 @@ def _ends(deformation: Deformation, is_open: list[Any]) -> tuple[Any, Any]:
 
 
 def _halved(low: Any, high: Any, lateral_stress: Callable[[Any], Any]) -> tuple[Any, Any]:
-    """Return the half of an interval in which the lateral stress, which rises, changes its sign."""
+    """Return the half of an interval in which the lateral stress, which rises, changes its sign; where it is zero."""
     middle = 0.5 * (low + high)
-    is_below, where = lateral_stress(middle) < 0, library(middle).where
-    return where(is_below, middle, low), where(is_below, high, middle)
+    stress, where = lateral_stress(middle), library(middle).where
+    return where(stress <= 0, middle, low), where(stress < 0, high, middle)
 
 
 def _refined(low: Any, high: Any, lateral_stress: Callable[[Any], Any]) -> Any:
