@@ -68,6 +68,9 @@ def test_strips_along_both_axes_of_a_tissue_are_fitted_with_fibres(cli, here):
     assert list(rows) == ["C10", "k_over_C10", "k"]
     assert (rows["k"]["unit"], rows["k"]["prior"]) == ("kPa", "follows from the others")
     assert float(rows["k"]["hdi_low"]) < 50 < float(rows["k"]["hdi_high"])
+    text = " ".join(cli("show", "run", "--details").out.split())
+    assert "those without lateral stress; k follows from the ratio" in text
+    assert "k follows from the others" not in text
     card = cli("export", "run", "--format", "febio", "--out", "cards")
     assert (card.status, card.err) == (0, "")
 

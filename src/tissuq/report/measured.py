@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.units import StressUnit
 from tissuq.report.result import Block, Section
-from tissuq.report.summary import parameter_rows
+from tissuq.report.summary import FOLLOWS, parameter_rows
 from tissuq.report.tables import interval
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ INTRODUCTION = (
 )
 INTERVALS = "Posterior means, with 95 % highest-density intervals of {meaning}: {numbers}."
 WHOLE_TESTS = "Errors of whole tests were included with these standard deviations: {sizes}."
+WITHOUT_LATERAL_STRESS = (
+    "Lateral stretches of tests with free sides are those without lateral stress; {derived} follows from the ratio to "
+    "the stiffness of the matrix."
+)
 NO_DISCREPANCY = "The measured stress was taken as the sum of the material's stress and noise: the material is right."
 DISCREPANCY = "The measured stress was taken as the sum of the material's stress, a discrepancy and noise. "
 ENERGY = (
@@ -140,7 +144,9 @@ def methods_section(study: SpecimenStudy) -> Section:
     priors = ", ".join(
         f"{row['parameter']} {row['prior']}{' ' * bool(row['unit'])}{row['unit']}"
         for row in parameter_rows({study.main: posterior})
+        if row["prior"] != FOLLOWS
     )
+    derived = ", ".join(parameter.symbol for parameter in posterior.model.derived_parameters)
     sizes = errors_in_words(posterior.model.tolerances, unit)
     numbers = []
     for name, *values in study.answer.estimates:
@@ -152,6 +158,7 @@ def methods_section(study: SpecimenStudy) -> Section:
         _discrepancy_in_words(posterior.model, study.main),
         f"Noise: {noise_in_words(study, posterior)}.",
         WHOLE_TESTS.format(sizes=sizes) if sizes else "",
+        WITHOUT_LATERAL_STRESS.format(derived=derived) if derived else "",
         f"Priors: {priors}.",
         f"Computation: {posterior.how}.",
         "" if diagnostics is None else diagnostics.verdict,

@@ -20,8 +20,8 @@ from tissuq.report.tables import (
 )
 
 __all__ = [
-    "SAME_STATES", "held_out_files", "held_out_table", "parameter_rows", "parameter_table", "stability_cells",
-    "stability_rows", "stability_section", "summary_row", "summary_table", "summary_tables",
+    "FOLLOWS", "SAME_STATES", "held_out_files", "held_out_table", "parameter_rows", "parameter_table",
+    "stability_cells", "stability_rows", "stability_section", "summary_row", "summary_table", "summary_tables",
 ]  # fmt: skip
 
 HOW_TO_READ = (
@@ -31,6 +31,8 @@ HOW_TO_READ = (
 )
 STABLE = " Stable: probability of stability over the measured stretches; all loading modes: `stability.csv`."
 LOST = " Lost at stretch: median [95 %] of the draws that become unstable."
+FOLLOWS = "follows from the others"
+"""In place of the prior of a parameter that is none of the model's."""
 STABILITY = ("stable", "lost_at", "lost_at_low", "lost_at_high")
 """Of `stability_cells`."""
 SAME_STATES = (
@@ -109,7 +111,7 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
                     "formulation": formulation,
                     "parameter": parameter.symbol,
                     "unit": unit.name if parameter.unit else "",
-                    "prior": str(priors.get(parameter.symbol, "follows from the others")),
+                    "prior": str(priors.get(parameter.symbol, FOLLOWS)),
                     **{name: known_number(numbers[name]) for name in ("mean", "sd", "median", "hdi_low", "hdi_high")},
                     "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
                     "ess": float(numbers["ess"]) if "ess" in numbers else None,
