@@ -109,6 +109,15 @@ def biaxial() -> tq.Experiment:
     return tq.simulate("mooney-rivlin", {"C10": 0.4, "C01": 0.08}, pairs, noise_sd=0.02, seed=6, mode="biaxial")
 
 
+def strips() -> tuple[tq.Experiment, ...]:
+    """Return uniaxial tests along both axes of a tissue with fibres."""
+    truth, stretch = {"C10": 0.4, "k": 1.5}, np.linspace(1.05, 1.4, 8)
+    return tuple(
+        tq.simulate("neo-hookean+standard-fibres@40", truth, stretch, noise_sd=0.02, seed=seed, mode=mode)
+        for seed, mode in enumerate(("uniaxial", "uniaxial@2"), 13)
+    )
+
+
 def three_modes() -> tuple[tq.Experiment, ...]:
     """Return a test in each of three modes."""
     return tuple(soft_tissue(mode, seed) for seed, mode in enumerate(("uniaxial", "equibiaxial", "simple-shear"), 10))
@@ -350,6 +359,9 @@ CASES: dict[str, Case] = {
     "ogden-1": tissue(material="ogden-1", discrepancy="none", noise_sd=0.02),
     "gent": tissue(material="gent", discrepancy="none", noise_sd=0.02),
     "fibres": fit_case(biaxial, material="neo-hookean+standard-fibres", discrepancy="none", at=[(1.1, 1.1)]),
+    "strips": fit_case(
+        strips, material="neo-hookean+standard-fibres@40", discrepancy="none", noise_sd=0.02, at=None, other="planar"
+    ),
     "gent-auto": tissue(material="gent", discrepancy="auto", noise_sd=0.02, other="planar"),
     "normal-priors": tissue(
         material="mooney-rivlin", discrepancy="constant", priors={"C10": tq.Normal(0.4, 0.1), "C01": tq.Normal(0, 0.1)}
