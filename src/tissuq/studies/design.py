@@ -69,8 +69,9 @@ class DesignStudy:
     def explanations(self) -> list[str]:
         """How to read the table."""
         whose = (
-            f"another specimen, whose stresses differ by about {100 * self.error:.0f} % as a whole; standard "
-            "deviations, now and after, are of the mean of the tissue's specimens"
+            f"another specimen (three more of the same: each on one of its own), whose stresses differ by about "
+            f"{100 * self.error:.0f} % as a whole; standard deviations, now and after, are of the mean of the tissue's "
+            "specimens"
             if self.specimen == "other"
             else "the same specimen, without additional test errors; for another specimen use --next-specimen other"
         )
