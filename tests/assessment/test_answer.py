@@ -12,7 +12,7 @@ import gallery
 import tissuq as tq
 from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
-from tissuq.assessment.next_step import STEPS, Step, _with_options
+from tissuq.assessment.next_step import STEPS, Step, _with_options, next_step
 from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, precision_of, uses_of
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
@@ -316,6 +316,25 @@ def test_the_next_step_has_the_options_of_the_warning_on_which_it_rests(warning,
     step = Step("fit again with {options}.", "act on the warning.")
     assert _with_options(step, ResultWarning(warning)).shell == f"fit again with {options}."
     assert _with_options(step, ResultWarning("torn.")).shell == step.python
+
+
+def test_the_next_step_has_all_options_where_another_warning_proposes_the_same_and_more():
+    step = Step("fit again with {options}.", "act on the warning.")
+    drift = ResultWarning("the zero drifts: give --branch loading, and for a zero --tolerance zero=16.")
+    cycles = ResultWarning("all 6 cycles are used: to fit one branch of one cycle, give --cycle last --branch loading.")
+    torn = ResultWarning("the specimen tore, or slipped: give --until-peak.")
+    for others in ([drift, cycles], [cycles, torn, drift]):
+        assert _with_options(step, drift, others).shell == "fit again with --cycle last --branch loading."
+    assert _with_options(step, torn, [torn, drift, cycles]).shell == "fit again with --until-peak."
+
+
+@pytest.mark.parametrize(("is_directed", "name"), [(False, "stable"), (True, "fibres")])
+def test_a_sheet_with_a_direction_needs_fibres_and_no_stable_draws_of_a_law_without(is_directed, name):
+    law = SimpleNamespace(material=material_named("neo-hookean"), energy_symbols=("c1",))
+    solution = SimpleNamespace(model=law, is_of_data=True, is_directed=is_directed)
+    uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
+    unstable = ResultWarning("unstable more often than stable.", "unstable")
+    assert next_step(solution, uses, [unstable]) == STEPS[name]
 
 
 @pytest.mark.parametrize(
