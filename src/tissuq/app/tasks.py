@@ -85,7 +85,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
             "run": name,
             "modes": [mode.name for mode in study.experiment.modes],
             "not_converged": study.not_converged,
-            "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
+            "repeat": {"shell": shell, "python": fit_lines(values | options, study.experiment.stress_unit)},
         }
         say("answer", {**record, **of_page})
 
@@ -126,7 +126,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
             "warnings": [{"severity": w.severity, "text": in_shell(w)} for w in study.warnings],
             "run": folder_name,
             "report": f"runs/{folder_name}/report.html",
-            "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
+            "repeat": {"shell": shell, "python": fit_lines(values | options, study.experiment.stress_unit)},
         },
     )
 

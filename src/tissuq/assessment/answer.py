@@ -131,7 +131,7 @@ def answer_of(
         model.meaning,
         uses,
         next_step(solution, uses, warnings),
-        model.experiment.stress_unit,
+        model.experiment.shown_unit.name,
         _law_in_words(solution, has_stress_at_rest),
         sheet_stresses(solution),
     )
