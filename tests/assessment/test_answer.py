@@ -292,12 +292,24 @@ def test_both_ends_of_a_skew_interval_are_said(ends, words):
     assert _ends_in_words(*ends) == words
 
 
+def test_a_fit_that_does_not_describe_its_own_measurements_serves_nothing_else():
+    posterior, inside = yeoh(discrepancy="auto"), np.ones(len(STRETCH), bool)
+    of_fit = posterior.solution, posterior.initial_shear_modulus, posterior.stable_ranges, []
+    assert {use.verdict for use in uses_of(*of_fit, inside)} <= {Verdict.YES, Verdict.CARE}
+    inside[: len(STRETCH) // 5] = False
+    reporting, *others = uses_of(*of_fit, inside)
+    assert reporting.verdict is Verdict.CARE
+    assert "but only 16 of 20 measurements inside the band" in reporting.reason
+    assert {use.verdict for use in others} == {Verdict.NO}
+
+
 def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
     posterior = yeoh(discrepancy="auto")
     assert posterior.answer.uses[1].verdict is Verdict.YES
     answer = posterior.answer_with([ResultWarning("the tests are apart.", "tests-apart")])
-    assert answer.uses[1].verdict is Verdict.CARE
-    assert "contradict" in answer.uses[1].reason
+    for use in answer.uses[1:3]:
+        assert use.verdict is Verdict.CARE
+        assert "contradict" in use.reason
     assert "contradict" in answer.next_step.shell
 
 

@@ -1,4 +1,4 @@
-"""What a run leaves is in the unit of the file, or a smaller one, and says so; what to do with runs of earlier versions."""
+"""What a run leaves is in the unit of the file, or a smaller one, and says so; what to do with earlier runs."""
 
 from __future__ import annotations
 

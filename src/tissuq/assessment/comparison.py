@@ -347,7 +347,7 @@ def _check_comparable(trees: Mapping[str, Any]) -> None:
 
 
 def values_in_mpa(values: Any) -> FloatArray:
-    """Return values of an array of a saved posterior, those of a stress in MPa: earlier files have them so, others in the unit of the data.
+    """Return values of a saved array, those of a stress in MPa, in which earlier files have them.
 
     A unit is that of all stresses.
     """
