@@ -89,10 +89,13 @@ def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
 def test_how_far_the_law_is_off_alone_is_said_where_it_is_known(share, words, monkeypatch):
     model = SimpleNamespace(discrepancy=discrepancy_named("auto"), material=material_named("yeoh"))
     monkeypatch.setattr(answer, "shares_of_discrepancy", lambda solution: (share, (0.0, 0.0, 0.0)))
-    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False)
+    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=True)
     assert text.startswith(words)
     assert bool(text) == bool(words)
-    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True)
+    of_poor_fit = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=False)
+    assert of_poor_fit == text.replace(" Use it with the discrepancy, as exported cards do.", "")
+    assert (of_poor_fit != text) == bool(words)
+    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True, is_described=True)
     assert at_rest.startswith("There is stress at rest") == bool(words)
 
 

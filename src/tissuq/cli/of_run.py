@@ -115,10 +115,9 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     ensemble = posterior.ensemble(settings.draws, settings.seed, spread, admissible=not settings.all_draws)
     said = said_by(run, posterior.model)
     source = f"run {run.resolve().name} of tissuq, {spread} draws from seed {settings.seed}"
-    if use := said.use:
-        source += f"; {use.purpose}: {use.verdict.upper()}, {use.reason}"
+    source += f"; {said.of_cards}" * bool(said.use)
     cards = write_cards(ensemble, target, settings.format, force=call.how.force, **of_cards | {"source": source})
-    if use:
+    if use := said.use:
         print_uses([{"purpose": use.purpose, "verdict": use.verdict, "reason": use.reason}])
     print_explanations(cards.warnings)
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]

@@ -56,6 +56,11 @@ class Said:
     next_step: str = ""
 
     @property
+    def of_cards(self) -> str:
+        """What stands in cards of its draws; nothing where it says nothing."""
+        return f"{self.use.purpose}: {self.use.verdict.upper()}, {self.use.reason}" if self.use else ""
+
+    @property
     def advice(self) -> str:
         """What to do before it is used in finite elements; nothing where it serves them."""
         if self.use is None or self.use.verdict is not Verdict.NO:
