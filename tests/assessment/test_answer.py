@@ -306,6 +306,14 @@ def test_a_fit_that_does_not_describe_its_own_measurements_serves_nothing_else()
     assert {use.verdict for use in others} == {Verdict.NO}
 
 
+def test_what_is_said_to_be_too_narrow_is_used_with_care_at_best():
+    posterior = yeoh(discrepancy="auto")
+    correlated = ResultWarning("residuals are autocorrelated.", "correlated-residuals")
+    for use in posterior.answer_with([correlated]).uses[:2]:
+        assert use.verdict is Verdict.CARE
+        assert "the errors of consecutive measurements hang together" in use.reason
+
+
 def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
     posterior = yeoh(discrepancy="auto")
     assert posterior.answer.uses[1].verdict is Verdict.YES

@@ -35,7 +35,11 @@ STEPS: Mapping[str, Step] = {
         "count from where load begins: fit again with --preload auto.",
         'count from where load begins: read again with preload="auto".',
     ),
-    "fibres": Step(*["fit a law with fibres, which has the preferred direction: tissuq materials lists them."] * 2),
+    "fibres": Step(
+        "fit a law with fibres, which has the preferred direction: fit again with --material holzapfel-gasser-ogden "
+        "(tissuq materials lists others).",
+        'fit a law with fibres, which has the preferred direction: fit again with material="holzapfel-gasser-ogden".',
+    ),
     "zero": Step(
         "take off what the load cell shows at rest: fit again with {options}.",
         'take off what the load cell shows at rest, as the warning says: read again with load_zero="first".',

@@ -21,6 +21,7 @@ from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity, symbols_in
 
 __all__ = [
+    "COMPUTING",
     "MIN_INSIDE",
     "MIN_OFTEN_STABLE",
     "MIN_STABLE",
@@ -41,8 +42,12 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
+CORRELATED, CORRELATED_ERRORS = "correlated-residuals", "the errors of consecutive measurements hang together"
+"""Code of the warning that intervals are too narrow, and why."""
 UNKNOWN = 3.0
 """Half width over the mean from which not even a sign or a power of ten is known."""
+COMPUTING = "compute with a new specimen"
+"""What cards, predictions and simulations of a new specimen of a population are for."""
 NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 """Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
 SPREAD = "assumed spread between specimens"
@@ -132,6 +137,8 @@ def _reporting(
         return worst_of(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
     if missed:
         return worst_of(verdict, Verdict.CARE), f"{width}, but {missed}"
+    if CORRELATED in codes:
+        return worst_of(verdict, Verdict.CARE), f"{width}, or less well: {CORRELATED_ERRORS}"
     if "measurements" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
     model = solution.model
@@ -189,6 +196,7 @@ def _own_tests(solution: Solution, codes: Collection[str], counts: str, missed: 
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
                          ("tests-apart", "the tests contradict each other"),
                          ("contradicting-tests", "the tests contradict each other"),
+                         (CORRELATED, CORRELATED_ERRORS),
                          ("measurements", "see the warning about the measurements")):  # fmt: skip
         if code in codes:
             return worst_of(verdict, Verdict.CARE), f"{sentence}, but {reason}"
