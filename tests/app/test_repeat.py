@@ -96,6 +96,16 @@ def test_a_fit_is_repeated_by_its_command_and_by_its_python(here, write_stretche
 
 
 @pytest.mark.slow
+def test_a_fit_of_small_stresses_in_mpa_is_repeated_with_its_noise(here, monkeypatch):
+    rows = "".join(f"{x},{5e-3 * (x - x**-2)}\n" for x in (1.05, 1.1, 1.15, 1.2, 1.25, 1.3))
+    (here / "soft.csv").write_text(f"stretch,stress_MPa\n{rows}", encoding="utf-8")
+    request = {"files": ["soft.csv"], "modes": ["uniaxial"], "discrepancies": ["none"], "noise_sd": 5e-5}
+    said = done("fit", request)
+    assert said["answer"]["numbers"][0]["unit"] == "kPa"
+    check_repeats(said, monkeypatch)
+
+
+@pytest.mark.slow
 def test_a_fit_of_a_mended_file_is_repeated(here, write_machine, monkeypatch):
     write_machine(here, "skin 1.csv")
     reading = {"dimensions": {"length": "12 mm"}, "branch": "loading", "preload": "auto"}
@@ -141,6 +151,7 @@ def test_laws_predictions_and_cards_are_repeated(here, write_stretches, monkeypa
 
     shown = done("export", {"run": run, "format": "abaqus", "draws": 3, "unit": "kPa"})["done"]
     folder = Path(shown["folder"])
+    assert shown["explanations"][0].startswith("use of the fit in finite elements: ")
     cards = {name: (folder / name).read_text() for name in shown["files"]}
     for repeat in (
         lambda: run_in_shell(shown["repeat"]["shell"], monkeypatch, "--force"),

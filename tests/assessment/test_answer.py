@@ -12,7 +12,7 @@ import gallery
 import tissuq as tq
 from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
-from tissuq.assessment.next_step import STEPS, Step, _with_options
+from tissuq.assessment.next_step import STEPS, Step, _with_options, next_step
 from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, precision_of, uses_of
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
@@ -89,10 +89,13 @@ def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
 def test_how_far_the_law_is_off_alone_is_said_where_it_is_known(share, words, monkeypatch):
     model = SimpleNamespace(discrepancy=discrepancy_named("auto"), material=material_named("yeoh"))
     monkeypatch.setattr(answer, "shares_of_discrepancy", lambda solution: (share, (0.0, 0.0, 0.0)))
-    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False)
+    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=True)
     assert text.startswith(words)
     assert bool(text) == bool(words)
-    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True)
+    of_poor_fit = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=False)
+    assert of_poor_fit == text.replace(" Use it with the discrepancy, as exported cards do.", "")
+    assert (of_poor_fit != text) == bool(words)
+    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True, is_described=True)
     assert at_rest.startswith("There is stress at rest") == bool(words)
 
 
@@ -292,12 +295,32 @@ def test_both_ends_of_a_skew_interval_are_said(ends, words):
     assert _ends_in_words(*ends) == words
 
 
+def test_a_fit_that_does_not_describe_its_own_measurements_serves_nothing_else():
+    posterior, inside = yeoh(discrepancy="auto"), np.ones(len(STRETCH), bool)
+    of_fit = posterior.solution, posterior.initial_shear_modulus, posterior.stable_ranges, []
+    assert {use.verdict for use in uses_of(*of_fit, inside)} <= {Verdict.YES, Verdict.CARE}
+    inside[: len(STRETCH) // 5] = False
+    reporting, *others = uses_of(*of_fit, inside)
+    assert reporting.verdict is Verdict.CARE
+    assert "but only 16 of 20 measurements inside the band" in reporting.reason
+    assert {use.verdict for use in others} == {Verdict.NO}
+
+
+def test_what_is_said_to_be_too_narrow_is_used_with_care_at_best():
+    posterior = yeoh(discrepancy="auto")
+    correlated = ResultWarning("residuals are autocorrelated.", "correlated-residuals")
+    for use in posterior.answer_with([correlated]).uses[:2]:
+        assert use.verdict is Verdict.CARE
+        assert "the errors of consecutive measurements hang together" in use.reason
+
+
 def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
     posterior = yeoh(discrepancy="auto")
     assert posterior.answer.uses[1].verdict is Verdict.YES
     answer = posterior.answer_with([ResultWarning("the tests are apart.", "tests-apart")])
-    assert answer.uses[1].verdict is Verdict.CARE
-    assert "contradict" in answer.uses[1].reason
+    for use in answer.uses[1:3]:
+        assert use.verdict is Verdict.CARE
+        assert "contradict" in use.reason
     assert "contradict" in answer.next_step.shell
 
 
@@ -316,6 +339,25 @@ def test_the_next_step_has_the_options_of_the_warning_on_which_it_rests(warning,
     step = Step("fit again with {options}.", "act on the warning.")
     assert _with_options(step, ResultWarning(warning)).shell == f"fit again with {options}."
     assert _with_options(step, ResultWarning("torn.")).shell == step.python
+
+
+def test_the_next_step_has_all_options_where_another_warning_proposes_the_same_and_more():
+    step = Step("fit again with {options}.", "act on the warning.")
+    drift = ResultWarning("the zero drifts: give --branch loading, and for a zero --tolerance zero=16.")
+    cycles = ResultWarning("all 6 cycles are used: to fit one branch of one cycle, give --cycle last --branch loading.")
+    torn = ResultWarning("the specimen tore, or slipped: give --until-peak.")
+    for others in ([drift, cycles], [cycles, torn, drift]):
+        assert _with_options(step, drift, others).shell == "fit again with --cycle last --branch loading."
+    assert _with_options(step, torn, [torn, drift, cycles]).shell == "fit again with --until-peak."
+
+
+@pytest.mark.parametrize(("is_directed", "name"), [(False, "stable"), (True, "fibres")])
+def test_a_sheet_with_a_direction_needs_fibres_and_no_stable_draws_of_a_law_without(is_directed, name):
+    law = SimpleNamespace(material=material_named("neo-hookean"), energy_symbols=("c1",))
+    solution = SimpleNamespace(model=law, is_of_data=True, is_directed=is_directed)
+    uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
+    unstable = ResultWarning("unstable more often than stable.", "unstable")
+    assert next_step(solution, uses, [unstable]) == STEPS[name]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import shutil
 
 import pytest
@@ -58,6 +59,22 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
     text = (here / "mine" / "draw-1.inp").read_text()
     assert "admissible: not looked at" in text
     assert "PROJECTION" in text
+
+
+def test_cards_say_what_the_fit_says_of_finite_elements(cli, here, run):
+    result = here / run / "result.json"
+    record = json.loads(result.read_text())
+    (of_fit,) = (use for use in record["uses"] if use["purpose"].startswith("simulate"))
+    of_fit |= {"verdict": "no", "reason": "it was made so by a test"}
+    result.write_text(json.dumps(record))
+    said = cli("export", run, "--draws", 2)
+    assert said.status == 0, said.err
+    assert said.out.startswith("  NO  use of the fit in finite elements: it was made so by a test\n")
+    assert "Next: do not use this yet; next step of the fit: " in said.out
+    for text in (here / "cards" / "specimen-abaqus").glob("*.inp"):
+        assert "use of the fit in finite elements: NO, it was made so by a test" in " ".join(
+            line.strip("* ") for line in text.read_text().splitlines()
+        )
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_every_way_to_give_the_same_measurements_gives_the_same_posterior(cli, h
     assert_closed_form(summary_of(here / "runs" / "test")[0])
 
 
-@pytest.mark.parametrize(("unit", "kpa"), [("Pa", 1e-3), ("MPa", 1e3), ("N/cm2", 10), ("psi", 6.894757293168361)])
+@pytest.mark.parametrize(("unit", "kpa"), [("Pa", 1e-3), ("N/cm2", 10), ("psi", 6.894757293168361)])
 def test_any_unit_of_stress_is_converted(cli, here, unit, kpa):
     file = written(here / "test.csv", stretch=stretch, stress=stress / kpa)
     said = cli("fit", file, "--stress-unit", unit, "--noise-sd", 1 / kpa, *ALONE)

@@ -92,7 +92,7 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
     assert headline["unit"] == "kPa"
     median = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "median")
     half_width = (float(median["hdi_high"]) - float(median["hdi_low"])) / 2 / float(median["median"])
-    reporting, predicting = contents["result"]["uses"]
+    reporting, predicting, _ = contents["result"]["uses"]
     assert reporting["purpose"] == "report the modulus of the tissue"
     assert f"known to ± {100 * half_width:.0f} %" in reporting["reason"]
     assert predicting["purpose"] == "predict a new specimen"
@@ -105,9 +105,12 @@ def test_predictions_and_cards_start_from_a_new_patient(population_run):
     row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
     patient = tq.load(folder / "run")
     assert float(patient.summary().loc["C10", "median"]) == pytest.approx(float(row["median"]), rel=0.02)
+    uses = json.loads((folder / "run" / "result.json").read_text())["uses"]
+    (use,) = (use for use in uses if use["purpose"] == "compute with a new specimen")
     for arguments in (["predict", "run", "--mode", "planar", "--points", 3, "--no-figures"], ["export", "run"]):
         said = run_in(folder, *arguments)
         assert said.status == 0, said.err
+        assert use["reason"] in " ".join(said.out.split())
 
 
 @pytest.mark.slow

@@ -37,3 +37,11 @@ def test_brackets_and_colons_in_a_name_are_shown_as_they_are(capsys):
     print_rows("[red]x.csv", ["[b]name", "C10"], [["[blue]a :smile:", "1.0"]])
     shown = capsys.readouterr().out
     assert all(text in shown for text in ("[red]x.csv", "[b]name", "[blue]a :smile:"))
+
+
+def test_columns_beneath_others_stand_beside_all_that_tells_the_rows_apart(capsys):
+    rows = [["auto", mode, *["1" * 20] * 5] for mode in ("uniaxial", "planar")]
+    print_rows("A title", ["discrepancy", "mode", *(f"number {number}" for number in range(5))], rows)
+    said = capsys.readouterr().out
+    assert said.count("number 0") == 1
+    assert said.count("uniaxial") == said.count("planar") == said.count("discrepancy") == 2

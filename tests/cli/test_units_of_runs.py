@@ -1,4 +1,4 @@
-"""What a run leaves is in the unit of the file, and says so; what to do with runs of earlier versions."""
+"""What a run leaves is in the unit of the file, or a smaller one, and says so; what to do with earlier runs."""
 
 from __future__ import annotations
 
@@ -32,6 +32,36 @@ def test_tables_of_a_run_are_in_the_unit_of_the_file(run):
     c10 = next(row for row in rows_of(run / "parameters.csv") if row["parameter"] == "C10")
     assert (c10["unit"], c10["prior"]) == ("kPa", "normal(40, 30, low=0)")
     assert float(c10["median"]) == pytest.approx(1e3 * marginal.quantile(0.5), rel=1e-9)
+
+
+@pytest.fixture
+def soft(cli, here, specimen):
+    """The same measurements in MPa, the largest of which is 0.05, with noise and prior in MPa, too."""
+    data = tq.read(specimen, unit="kPa")
+    rows = "".join(f"{x!r},{y!r}\n" for x, y in zip(data.stretch.tolist(), data.stress.tolist(), strict=True))
+    (here / "soft.csv").write_text(f"stretch,stress_MPa\n{rows}", encoding="utf-8")
+    options = ["--discrepancy", "none", "--noise-sd", 1e-3, "--prior", "C10=normal(0.04,0.03)", "--no-figures"]
+    said = cli("fit", "soft.csv", *options, "--out", "soft")
+    assert said.status == 0, said.err
+    return here / "soft", said.out
+
+
+def test_small_stresses_in_mpa_are_shown_in_kpa_and_typed_in_mpa(cli, here, specimen, soft):
+    options = ["--discrepancy", "none", "--noise-sd", 1, "--prior", "C10=normal(40,30)", "--no-figures"]
+    said = cli("fit", specimen, *options, "--out", "kpa")
+    assert said.status == 0, said.err
+    folder, printed = soft
+    answer = [line for line in printed.splitlines() if " C10 " in line]
+    assert answer == [line for line in said.out.splitlines() if " C10 " in line]
+    assert " kPa" in answer[0]
+    c10 = next(row for row in rows_of(folder / "parameters.csv") if row["parameter"] == "C10")
+    assert (c10["unit"], c10["prior"]) == ("MPa", "normal(0.04, 0.03, low=0)")
+    assert "Noise: sd 0.001 MPa." in cli("show", folder, "--details").out
+    assert " kPa" in cli("compare", folder, "kpa").out.partition("over the fits")[2].splitlines()[0]
+    scores = [rows_of(here / name / "scores.csv")[0] for name in ("a", "b") if cli(
+        "predict", folder if name == "a" else "kpa", "--data", "soft.csv", "--out", name, "--no-figures"
+    ).status == 0]  # fmt: skip
+    assert float(scores[0]["crps [kPa]"]) == pytest.approx(float(scores[1]["crps [kPa]"]), rel=1e-6)
 
 
 def test_the_data_of_a_run_are_read_back_with_their_unit(run, specimen):

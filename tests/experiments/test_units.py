@@ -60,6 +60,17 @@ def test_a_stress_unit_keeps_the_spelling_of_the_user():
     assert stress_unit("N/mm²").name == "N/mm²"
 
 
+@pytest.mark.parametrize(
+    ("unit", "largest", "shown"),
+    [("MPa", 0.11, "MPa"), ("MPa", 0.09, "kPa"), ("N/mm2", 0.002, "kPa"), ("MPa", 9e-5, "Pa"), ("kPa", 2e-4, "kPa"),
+     ("kPa", 9e-5, "Pa"), ("Pa", 1e-9, "Pa"), ("psi", 1e-5, "psi"), ("MPa", 0.0, "MPa"), ("MPa", 9e-8, "MPa")],
+)  # fmt: skip
+def test_small_stresses_are_read_in_a_smaller_unit(unit, largest, shown):
+    readable = stress_unit(unit).readable(largest)
+    assert readable.name == shown
+    assert readable.to_mpa == stress_unit(shown).to_mpa
+
+
 def test_the_millipascal_must_be_written_in_full():
     assert stress_unit("millipascal").to_mpa == pytest.approx(1e-9)
     with pytest.raises(InputError, match="write MPa for megapascal, or millipascal in full"):

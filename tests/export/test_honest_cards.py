@@ -81,3 +81,17 @@ def test_a_card_is_stable_to_half_again_the_measured_invariants_where_free_least
         assert row["card_is_stable_within_1.5"]
         least = np.linalg.eigvalsh(hessians(READERS["abaqus"](text).energy, states(ensemble.most, 1.5))).min()
         assert least > 0
+
+
+def test_cards_that_do_not_follow_their_draws_are_not_to_be_computed_with(given):
+    """Against one Ogden term of exponent 9, neo-Hooke of the same initial modulus; one of exponent 2 is neo-Hooke."""
+    ensemble = given([("ogden-1", [1.0, 9.0])], [("ogden-1", [1.0, 2.0])])
+    cards = card_format("abaqus").cards(ensemble, CardSettings(law="reduced-polynomial", order=1))
+    stretch = np.linspace(0.7, 2.0, 26)
+    draw = 2 / 9 * (stretch**8 - stretch**-5.5)
+    apart = (stretch - stretch**-2) / draw - 1
+    assert np.sqrt((apart**2).mean()) > 0.3
+    wrong, right = cards.files.values()
+    assert "the card does NOT stand for the draw: do not compute with it" in wrong
+    assert "do not compute" not in right
+    assert cards.warnings[0].startswith("Do NOT compute with the cards of draw 1 of 2: their stresses are off by ")

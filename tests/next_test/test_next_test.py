@@ -65,18 +65,21 @@ def test_many_measurements_are_stood_for_by_few(known):
     assert found.sd_after[0] == pytest.approx(NOISE / np.sqrt(x @ x + z @ z), rel=2e-3)
 
 
+@pytest.mark.parametrize("tests", [1, 3])
 @pytest.mark.parametrize("zero", [0.0, 0.05])
-def test_another_specimen_has_errors_of_its_own(zero):
+def test_other_specimens_have_errors_of_their_own(zero, tests):
     # y = (1 + e) C10 x + z + noise, e of 18 % and z of some MPa for each specimen; the tissue's C10 is wanted.
     new, share = np.array([1.1, 1.3]), 0.18
     tolerances = tq.Tolerances(stress=share, zero=zero)
     posterior = tq.fit(data_of()[0], discrepancy="none", noise_sd=NOISE, tolerances=tolerances)
-    first, second = 0.5 * neo_hooke("uniaxial", STRETCH), 0.5 * neo_hooke("planar", new)
-    found = asked_of(posterior, "C10").expected(tq.Candidate("planar", new))
-    X = np.zeros((len(STRETCH) + len(new), 5))  # C10, e and z of the first specimen, of the second, to first order
-    X[: len(STRETCH), :3] = np.column_stack([2 * first, first, np.ones(len(first))])
-    X[len(STRETCH) :, [0, 3, 4]] = np.column_stack([2 * second, second, np.ones(2)])
-    prior = np.diag([0, *[share**-2, max(zero, 1e-9) ** -2] * 2])
+    found = asked_of(posterior, "C10").expected(tq.Candidate("planar", new, tests=tests))
+    of_specimens = [neo_hooke("uniaxial", STRETCH), *[neo_hooke("planar", new)] * tests]
+    X = np.zeros((sum(map(len, of_specimens)), 1 + 2 * len(of_specimens)))  # C10, then e and z of each, to first order
+    start = 0
+    for number, unit_stress in enumerate(of_specimens):
+        rows, start = slice(start, start + len(unit_stress)), start + len(unit_stress)
+        X[rows, 0], X[rows, 1 + 2 * number], X[rows, 2 + 2 * number] = unit_stress, 0.5 * unit_stress, 1.0
+    prior = np.diag([0, *[share**-2, max(zero, 1e-9) ** -2] * len(of_specimens)])
     sds = [np.sqrt(np.linalg.inv(rows.T @ rows / NOISE**2 + prior)[0, 0]) for rows in (X[: len(STRETCH)], X)]
     np.testing.assert_allclose([found.sd_now[0], found.sd_after[0]], sds, rtol=0.02)  # e counts there to second order
 

@@ -12,11 +12,11 @@ from scipy.special import logsumexp
 from scipy.stats import norm, truncnorm
 
 import tissuq as tq
-from tissuq.assessment.uses import Use, Verdict
+from tissuq.assessment.uses import COMPUTING, Use, Verdict
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report import population_in_words
-from tissuq.report.population_in_words import next_step_of
+from tissuq.report.population_in_words import next_step_of, use_of_law_alone
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
@@ -475,6 +475,15 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert next_step_of(population, [], share=0.3, uses=useless).startswith("fit another law")
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
     assert next_step_of(population, []).startswith("find out why the specimens differ so much")
+
+
+def test_what_leaves_the_discrepancy_out_serves_where_that_carries_little():
+    predicting = Use(PREDICTING, Verdict.CARE, "known to ± 30 %")
+    assert use_of_law_alone(0.2, predicting) == predicting._replace(purpose=COMPUTING)
+    verdict, reason = use_of_law_alone(0.95, predicting)[1:]
+    assert verdict is Verdict.NO
+    assert "which carries 95 % of the stress" in reason
+    assert use_of_law_alone(0.1, Use(PREDICTING, Verdict.NO, NOT_PREDICTED)).verdict is Verdict.CARE
 
 
 def test_the_modulus_of_a_law_that_is_wrong_is_that_at_rest_where_the_law_carries_it(monkeypatch):

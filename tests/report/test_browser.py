@@ -152,7 +152,7 @@ def test_loading_and_unloading_are_read_out_apart(tmp_path):
 
 def test_small_stresses_are_told_apart_on_the_axis_and_in_words(tmp_path):
     file = tmp_path / "soft.csv"
-    file.write_text("stretch,stress_MPa\n" + "".join(f"{x},{6e-5 * (x - x**-2)}\n" for x in np.linspace(1, 1.3, 9)))
+    file.write_text("stretch,stress_psi\n" + "".join(f"{x},{6e-5 * (x - x**-2)}\n" for x in np.linspace(1, 1.3, 9)))
     study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 1e-7}], discrepancies=["none"]))
     folder = tmp_path / "run"
     folder.mkdir()

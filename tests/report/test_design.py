@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -109,6 +110,15 @@ def test_without_figures_there_are_none(study, tmp_path):
     write_result(design_result(study, study.settings, tmp_path / "run"), tmp_path, figures=False)
     assert not (tmp_path / "figures").exists()
     assert "<img" not in (tmp_path / "report.html").read_text()
+
+
+def test_long_names_of_tests_leave_room_for_the_figure(study, tmp_path):
+    named = study.table.assign(candidate=study.table["candidate"] + " (brain-cortex-of-the-second-specimen)")
+    figure = design_result(replace(study, table=named), study.settings, tmp_path).picture.figure()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure.draw_without_rendering()
+    assert figure.axes[0].get_position().width > 0.4
 
 
 def test_the_figure_has_a_panel_for_each_target_with_the_best_on_top(study):

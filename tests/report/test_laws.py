@@ -19,7 +19,7 @@ from tissuq.studies.laws import LawStudy
 
 
 def law_study(comparison, settings=None):
-    return LawStudy(settings, SimpleNamespace(stress_unit="MPa"), comparison)
+    return LawStudy(settings, SimpleNamespace(shown_unit=stress_unit("MPa")), comparison)
 
 
 def test_the_finding_is_said_whether_or_not_a_law_can_be_fitted_alone():

@@ -85,7 +85,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
             "run": name,
             "modes": [mode.name for mode in study.experiment.modes],
             "not_converged": study.not_converged,
-            "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
+            "repeat": {"shell": shell, "python": fit_lines(values | options, study.experiment.stress_unit)},
         }
         say("answer", {**record, **of_page})
 
@@ -126,7 +126,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
             "warnings": [{"severity": w.severity, "text": in_shell(w)} for w in study.warnings],
             "run": folder_name,
             "report": f"runs/{folder_name}/report.html",
-            "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
+            "repeat": {"shell": shell, "python": fit_lines(values | options, study.experiment.stress_unit)},
         },
     )
 
@@ -170,6 +170,7 @@ def export(request: Mapping[str, Any], say: Say) -> None:
     """Write draws of a run as material cards; say the files and what they are."""
     from tissuq.export import CardSettings
     from tissuq.report.cards import write_cards
+    from tissuq.report.source_run import said_by
     from tissuq.studies.earlier_run import load
 
     format, draws, seed = str(request["format"]), int(request.get("draws") or 20), int(request.get("seed") or 0)
@@ -178,9 +179,10 @@ def export(request: Mapping[str, Any], say: Say) -> None:
     settings = CardSettings(unit=unit)
     target = CARDS / f"{run.name}-{format}"
     say("step", "drawing")
-    ensemble = load(run).ensemble(draws, seed, admissible=not keep_all)
+    posterior = load(run)
+    ensemble, said = posterior.ensemble(draws, seed, admissible=not keep_all), said_by(run, posterior.model)
     say("step", "writing the cards")
-    source = f"run {run.name} of tissuq, sobol draws from seed {seed}"
+    source = f"run {run.name} of tissuq, sobol draws from seed {seed}" + f"; {said.of_cards}" * bool(said.use)
     cards = write_cards(ensemble, target, format, force=True, source=source, unit=settings.unit)
     options = {"format": format, "draws": draws, "unit": unit, "seed": seed, "all_draws": keep_all}
     drawn = f"{draws}, seed={seed}" + (", admissible=False" if keep_all else "")
@@ -192,7 +194,7 @@ def export(request: Mapping[str, Any], say: Say) -> None:
         "done",
         {
             "files": list(cards.files),
-            "explanations": list(cards.warnings),
+            "explanations": [*filter(None, [said.of_cards]), *cards.warnings],
             "example": next(iter(cards.files.values())),
             "folder": target.as_posix(),
             "repeat": {"shell": command("export", [run.as_posix()], options), "python": "\n".join(python)},

@@ -14,7 +14,7 @@ from tissuq.assessment.modulus import modulus
 from tissuq.assessment.next_step import Step, next_step
 from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.stability import StableRange, measured_states
-from tissuq.assessment.uses import PRECISE, Use, uses_of
+from tissuq.assessment.uses import PRECISE, Use, Verdict, uses_of
 from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit, stress_unit
@@ -131,33 +131,36 @@ def answer_of(
         model.meaning,
         uses,
         next_step(solution, uses, warnings),
-        model.experiment.stress_unit,
-        _law_in_words(solution, has_stress_at_rest),
+        model.experiment.shown_unit.name,
+        _law_in_words(solution, has_stress_at_rest, uses[1].verdict is not Verdict.NO),
         sheet_stresses(solution),
     )
 
 
-def _law_in_words(solution: Solution, has_stress_at_rest: bool) -> str:
-    """Return in words how far the law by itself is from the measurements; nothing where it describes them."""
+def _law_in_words(solution: Solution, has_stress_at_rest: bool, is_described: bool) -> str:
+    """Return in words how far the law by itself is from the measurements; nothing where it describes them.
+
+    That it is to be used with the discrepancy is said where both together describe the measurements.
+    """
     (mean, low, high), _ = shares_of_discrepancy(solution)
     if not has_energy(solution.model) or mean <= NOTABLE_SHARE:
         return ""
-    law = solution.model.material.name
+    law, together = solution.model.material.name, f" {TOGETHER}" * is_described
     if has_stress_at_rest:
         return f"There is stress at rest, so that it cannot be said how far {law} alone is off."
     if mean <= PRECISE:
-        return f"{law} alone is off by {100 * mean:.0f} % of the stress. {TOGETHER}"
+        return f"{law} alone is off by {100 * mean:.0f} % of the stress.{together}"
     if high < 1:
         return (
             f"{law} alone is wrong here: the discrepancy carries {100 * mean:.0f} % of the stress (95 % interval "
-            f"{100 * low:.0f} % to {100 * high:.0f} %). {TOGETHER}"
+            f"{100 * low:.0f} % to {100 * high:.0f} %).{together}"
         )
     if low > 1:
         return (
             f"{law} alone is wrong here: the discrepancy opposes it with {100 * mean:.0f} % of the stress (95 % "
-            f"interval {100 * low:.0f} % to {100 * high:.0f} %). {TOGETHER}"
+            f"interval {100 * low:.0f} % to {100 * high:.0f} %).{together}"
         )
-    return f"How much of the stress is {law}'s and how much the discrepancy's is not determined. {TOGETHER}"
+    return f"How much of the stress is {law}'s and how much the discrepancy's is not determined.{together}"
 
 
 def sheet_stresses(solution: Solution) -> SheetStresses | None:

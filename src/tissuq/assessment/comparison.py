@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Average", "average", "compare", "scores_of"]
+__all__ = ["Average", "average", "compare", "scores_of", "values_in_mpa"]
 
 NEGLIGIBLE_WEIGHT = 1e-9
 """Weight below which a fit is omitted from marginals and predictions."""
@@ -339,15 +339,15 @@ def _check_comparable(trees: Mapping[str, Any]) -> None:
         if trees[name].attrs.get("loading_mode") != first_tree.attrs.get("loading_mode"):
             raise InputError(f"'{names[0]}' and '{name}' are fits of different loading modes.")
         for group, variable in (("observed_data", "stress"), ("constant_data", "stretch")):
-            values, other_values = (_plain(tree[group][variable]) for tree in (first_tree, trees[name]))
+            values, other_values = (values_in_mpa(tree[group][variable]) for tree in (first_tree, trees[name]))
             if not agree(values, other_values, FOUR_DIGITS):
                 raise InputError(
                     f"'{names[0]}' and '{name}' are fits of different measurements: compare fits of the same ones."
                 )
 
 
-def _plain(values: Any) -> FloatArray:
-    """Return values of an array, those of a stress in MPa: earlier files have them so, others in the unit of the data.
+def values_in_mpa(values: Any) -> FloatArray:
+    """Return values of a saved array, those of a stress in MPa, in which earlier files have them.
 
     A unit is that of all stresses.
     """

@@ -254,7 +254,7 @@ def assess(
         modulus=(stiffness.mean, *stiffness.hdi()),
         modulus_symbols=(symbols := modulus_symbols(model)),
         other_symbols=tuple(symbol for symbol in model.material_symbols if symbol not in symbols),
-        unit=model.experiment.stress_unit,
+        unit=model.experiment.shown_unit.name,
         amplitudes={
             symbol: float(solution.marginals[symbol].quantile(0.5)) / marginal.mean for symbol in model.energy_symbols
         },

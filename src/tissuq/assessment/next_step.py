@@ -35,7 +35,11 @@ STEPS: Mapping[str, Step] = {
         "count from where load begins: fit again with --preload auto.",
         'count from where load begins: read again with preload="auto".',
     ),
-    "fibres": Step(*["fit a law with fibres, which has the preferred direction: tissuq materials lists them."] * 2),
+    "fibres": Step(
+        "fit a law with fibres, which has the preferred direction: fit again with --material holzapfel-gasser-ogden "
+        "(tissuq materials lists others).",
+        'fit a law with fibres, which has the preferred direction: fit again with material="holzapfel-gasser-ogden".',
+    ),
     "zero": Step(
         "take off what the load cell shows at rest: fit again with {options}.",
         'take off what the load cell shows at rest, as the warning says: read again with load_zero="first".',
@@ -107,7 +111,9 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
     for warning in warnings:
         is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))
         if warning.severity is Severity.CAUTION and warning.code in STEPS_OF_WARNINGS and is_due:
-            return _with_options(STEPS[STEPS_OF_WARNINGS[warning.code]], warning)
+            name = STEPS_OF_WARNINGS[warning.code]
+            is_hopeless = name == "stable" and solution.is_directed  # no card of the law has the direction
+            return _with_options(STEPS["fibres" if is_hopeless else name], warning, warnings)
     if not solution.is_of_data:
         return STEPS["export"]
     if solution.is_directed:
@@ -122,9 +128,21 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
     return STEPS["export" if simulating is not Verdict.NO else "design"]
 
 
-def _with_options(step: Step, warning: ResultWarning) -> Step:
-    """Return a step with the options that a warning proposes first, or without a command where it proposes none."""
+def _with_options(step: Step, warning: ResultWarning, others: Sequence[ResultWarning] = ()) -> Step:
+    """Return a step with the options that a warning proposes first, or without a command where it proposes none.
+
+    Where another one proposes these and more, it has all of that.
+    """
     if "{options}" not in step.shell:
         return step
-    proposed = OPTIONS.search(warning.shell)
-    return step._replace(shell=step.shell.replace("{options}", proposed[0]) if proposed else step.python)
+    proposed, *further = (OPTIONS.search(each.shell) for each in (warning, *others))
+    if not proposed:
+        return step._replace(shell=step.python)
+    least = _single(proposed[0])
+    fullest = max((found[0] for found in (proposed, *further) if found and _single(found[0]) >= least), key=len)
+    return step._replace(shell=step.shell.replace("{options}", fullest))
+
+
+def _single(options: str) -> set[str]:
+    """Return the options of a text one by one."""
+    return set(re.findall(OPTION, options))

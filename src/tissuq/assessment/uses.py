@@ -21,6 +21,7 @@ from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity, symbols_in
 
 __all__ = [
+    "COMPUTING",
     "MIN_INSIDE",
     "MIN_OFTEN_STABLE",
     "MIN_STABLE",
@@ -41,8 +42,12 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
+CORRELATED, CORRELATED_ERRORS = "correlated-residuals", "the errors of consecutive measurements hang together"
+"""Code of the warning that intervals are too narrow, and why."""
 UNKNOWN = 3.0
 """Half width over the mean from which not even a sign or a power of ten is known."""
+COMPUTING = "compute with a new specimen"
+"""What cards, predictions and simulations of a new specimen of a population are for."""
 NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 """Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
 SPREAD = "assumed spread between specimens"
@@ -77,10 +82,12 @@ def uses_of(
 ) -> tuple[Use, ...]:
     """Return for what a posterior with this initial shear modulus can be used; the others as in `answer_of`."""
     codes = {w.code for w in warnings if w.code != "measurements" or w.severity is not Severity.NOTE}
-    own_tests = _own_tests(solution, inside, codes)
-    other_modes = _other_modes(solution, ranges, codes, own_tests)
+    counts = f"{inside.sum()} of {len(inside)} measurements inside the band"
+    missed = f"only {counts}" if inside.sum() < MIN_INSIDE * len(inside) else ""
+    own_tests = _own_tests(solution, codes, counts, missed)
+    other_modes = _other_modes(solution, ranges, codes, own_tests, missed)
     return (
-        Use("report the modulus", *_reporting(solution, stiffness, codes, warnings)),
+        Use("report the modulus", *_reporting(solution, stiffness, codes, warnings, missed)),
         Use("predict these tests", *own_tests),
         Use("predict other loading modes", *other_modes),
         Use("simulate with finite elements", *_simulating(solution, ranges, other_modes, codes)),
@@ -88,7 +95,11 @@ def uses_of(
 
 
 def _reporting(
-    solution: Solution, stiffness: Marginal, codes: Collection[str], warnings: Sequence[ResultWarning]
+    solution: Solution,
+    stiffness: Marginal,
+    codes: Collection[str],
+    warnings: Sequence[ResultWarning],
+    missed: str,
 ) -> tuple[Verdict, str]:
     """Return whether the modulus can be reported."""
     symbols = modulus_symbols(solution.model)
@@ -124,6 +135,10 @@ def _reporting(
         return worst_of(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
     if "not-near-reference" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
+    if missed:
+        return worst_of(verdict, Verdict.CARE), f"{width}, but {missed}"
+    if CORRELATED in codes:
+        return worst_of(verdict, Verdict.CARE), f"{width}, or less well: {CORRELATED_ERRORS}"
     if "measurements" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
     model = solution.model
@@ -161,19 +176,17 @@ def worst_of(*verdicts: Verdict) -> Verdict:
     return max(verdicts, key=list(Verdict).index)
 
 
-def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[str]) -> tuple[Verdict, str]:
+def _own_tests(solution: Solution, codes: Collection[str], counts: str, missed: str) -> tuple[Verdict, str]:
     """Return whether the measured tests are described, over the range in which they were measured."""
     if not solution.is_of_data:
         return Verdict.NO, "no test was measured of what this posterior describes"
-    held, count = int(inside.sum()), len(inside)
-    counts = f"{held} of {count} measurements inside the band"
     try:
         widths = [relative_half_width(_band_of(solution, curve)) for curve in solution.model.experiment.curves]
     except TissuqError as error:
         return Verdict.NO, str(error)
     verdict, width = precision_of(max(widths))
-    if held < MIN_INSIDE * count:
-        return Verdict.NO, f"only {counts}"
+    if missed:
+        return Verdict.NO, missed
     names = [curve.name for curve in solution.model.experiment.curves]
     worst_test = f", worst in '{names[int(np.argmax(widths))]}'" if max(widths) > SKEW * min(widths) else ""
     of_what = "of another such test " if solution.model.tolerances.estimand == TISSUE else ""
@@ -183,6 +196,7 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
                          ("tests-apart", "the tests contradict each other"),
                          ("contradicting-tests", "the tests contradict each other"),
+                         (CORRELATED, CORRELATED_ERRORS),
                          ("measurements", "see the warning about the measurements")):  # fmt: skip
         if code in codes:
             return worst_of(verdict, Verdict.CARE), f"{sentence}, but {reason}"
@@ -203,7 +217,11 @@ def relative_half_width(band: Band) -> float:
 
 
 def _other_modes(
-    solution: Solution, ranges: Mapping[str, StableRange], codes: Collection[str], own_tests: tuple[Verdict, str]
+    solution: Solution,
+    ranges: Mapping[str, StableRange],
+    codes: Collection[str],
+    own_tests: tuple[Verdict, str],
+    missed: str,
 ) -> tuple[Verdict, str]:
     """Return whether loading modes that were not measured can be predicted, within the measured invariants."""
     model = solution.model
@@ -212,6 +230,8 @@ def _other_modes(
         return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' belongs to the stress of the measured test"
     if "unmodelled-curve" in codes:
         return Verdict.NO, "the material alone does not follow the measured curve"
+    if missed:
+        return Verdict.NO, f"not even the measured tests are described: {missed}"
     unmeasured = {name: stable_range for name, stable_range in ranges.items() if name not in measured}
     if not unmeasured:
         if not ranges:
@@ -236,6 +256,8 @@ def _other_modes(
     )
     origin = "measured" if solution.is_of_data else "stated"
     sentence = f"within the strains that were {origin}: {of_modes}"
+    if {"tests-apart", "contradicting-tests"} & {*codes}:
+        return worst_of(verdict, Verdict.CARE), f"{sentence}; but the tests contradict each other"
     is_one_path = len(measured) == 1 and len(model.experiment.modes[0].controls) == 1
     if solution.is_of_data and is_one_path:
         return worst_of(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
@@ -302,5 +324,5 @@ def _simulating(
         return Verdict.NO, f"the stress in other loading modes is not known well enough{also}"
     stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
     if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
-        return Verdict.CARE, f"as uncertain as the other loading modes above; {share}"
+        return Verdict.CARE, f"as uncertain as the stress in other loading modes; {share}"
     return worst_of(stable, other_modes[0]), f"{share}; what leaves the {origin} strains is extrapolated"

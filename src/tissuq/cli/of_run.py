@@ -101,7 +101,8 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
     from tissuq.export import card_format
     from tissuq.report.cards import INDEX, write_cards
-    from tissuq.report.terminal import print_explanations
+    from tissuq.report.source_run import said_by
+    from tissuq.report.terminal import print_explanations, print_next, print_uses
     from tissuq.studies.earlier_run import load
 
     settings = call.settings
@@ -112,9 +113,15 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     posterior = load(run, settings.discrepancy, settings.law_of(call.law))
     spread = cast("Sampling", settings.sampling)
     ensemble = posterior.ensemble(settings.draws, settings.seed, spread, admissible=not settings.all_draws)
+    said = said_by(run, posterior.model)
     source = f"run {run.resolve().name} of tissuq, {spread} draws from seed {settings.seed}"
+    source += f"; {said.of_cards}" * bool(said.use)
     cards = write_cards(ensemble, target, settings.format, force=call.how.force, **of_cards | {"source": source})
+    if use := said.use:
+        print_uses([{"purpose": use.purpose, "verdict": use.verdict, "reason": use.reason}])
     print_explanations(cards.warnings)
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]
     print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
     print(f"The most typical draw, nearest to the median stresses: {files[distances.index(min(distances))]}")
+    if said.advice:
+        print_next(said.advice)

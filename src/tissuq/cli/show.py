@@ -117,6 +117,7 @@ class CompareOptions(IntoFolder, Verbosity):
 def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits
+    from tissuq.assessment.comparison import values_in_mpa
     from tissuq.experiments.units import stress_unit
     from tissuq.report.comparison import comparison_result
     from tissuq.report.run_folder import run_folder
@@ -134,7 +135,8 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
         step("comparing")
         table = compare_fits(trees)
     units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
-    unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
+    measured = values_in_mpa(next(iter(trees.values()))["observed_data"]["stress"])
+    unit = stress_unit(units.pop() if len(units) == 1 else "MPa").readable(float(abs(measured).max()))
     result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
         with run_folder(out, call.command, force=force) as folder:

@@ -17,6 +17,7 @@ from tissuq.experiments.checked_arrays import agree, checked, checked_points, in
 from tissuq.experiments.curve import Curve, draw_curves, small_svg
 from tissuq.experiments.modes import LoadingMode, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
+from tissuq.experiments.units import StressUnit
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
 __all__ = ["Experiment"]
@@ -230,8 +231,13 @@ class Experiment:
 
     @property
     def stress_unit(self) -> str:
-        """The unit in which people want to read the stresses: that of the first test."""
+        """The unit in which people give the stresses: that of the first test."""
         return self.curves[0].stress_unit
+
+    @property
+    def shown_unit(self) -> StressUnit:
+        """The unit in which pages show stresses: that, or kPa or Pa where they are small in it."""
+        return stress_unit_of(self.stress_unit).readable(float(np.abs(self.measured).max()))
 
     @property
     def specimen(self) -> str:

@@ -51,6 +51,8 @@ COMMON_STRESS_UNITS = {
     "dyn/cm2": 1e-7,
     "psi": 0.006894757293168361,
 }
+SMALL, READABLE = 0.1, (1.0, 1e-3)
+"""Share of a unit below which a stress is read in a smaller one, and the units (MPa) of which that holds."""
 PASCALS = {unit.lower(): unit for unit in COMMON_STRESS_UNITS if unit.endswith("Pa")}
 STRAIN_UNITS = dict.fromkeys(["", "1", "-", "mm/mm"], 1.0)
 STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
@@ -115,6 +117,18 @@ class StressUnit:
         '250 kPa'
         """
         return f"{stress / self.to_mpa:.6g} {self.name}"
+
+    def readable(self, stress: float) -> StressUnit:
+        """Return this unit, or kPa or Pa where the largest stress, in MPa, is less than a tenth of MPa or kPa.
+
+        Examples
+        --------
+        >>> StressUnit("MPa", 1.0).readable(0.25).name, StressUnit("MPa", 1.0).readable(0.004).name
+        ('MPa', 'kPa')
+        """
+        smaller = (StressUnit(name, COMMON_STRESS_UNITS[name]) for name in ("kPa", "Pa"))
+        is_small = self.to_mpa in READABLE and stress < SMALL * self.to_mpa
+        return next((unit for unit in smaller if is_small and stress >= SMALL * unit.to_mpa), self)
 
 
 def stress_unit(text: str) -> StressUnit:

@@ -20,6 +20,8 @@ __all__ = ["JudgedLaw"]
 
 FloatArray = NDArray[np.float64]
 
+TOO_FAR = 0.1
+"""Root mean square error of the stresses that were measured above which a card does not stand for its draw."""
 MIN_STABLE_SHARE = 0.9
 """Share of stable draws above which projections are compared by their error alone."""
 
@@ -68,6 +70,11 @@ class JudgedLaw:
         return np.asarray(self.errors[within(1)].max(axis=1) <= WANTED_ERROR)
 
     @property
+    def sizes(self) -> FloatArray:
+        """Root mean square errors (N,) of the cards in the states that were measured."""
+        return np.asarray([_rms(error) for error in self.errors[within(1)]])
+
+    @property
     def rank(self) -> tuple[bool, float]:
         """Sort key, smaller is better: nearly all draws stable first, then the smaller error."""
         return bool(self.stable.mean() < MIN_STABLE_SHARE), _rms(self.errors[within(1)])
@@ -91,7 +98,9 @@ class JudgedLaw:
             )
             for name, error in self.errors.items():
                 yield f"    {_label(name)}: {_percent(_largest(error[draw]))}, {_percent(_rms(error[draw]))}"
-            if not self.is_near[draw]:
+            if self.sizes[draw] > TOO_FAR:
+                yield "    WARNING: the card does NOT stand for the draw: do not compute with it"
+            elif not self.is_near[draw]:
                 yield f"    WARNING: the card is more than {_percent(WANTED_ERROR)} off in a state that was measured"
         if not self.stable[draw]:
             yield "    WARNING: the card is NOT stable over the whole calibrated range"
@@ -103,6 +112,7 @@ class JudgedLaw:
         if self.projection is None:
             yield f"The cards are the draws' own law, exactly: {self.form.keyword}."
         else:
+            yield from self._wrong_cards()
             yield (
                 f"The draws' own law has no card in {code}, so every card is the nearest {self.form.keyword}: its "
                 f"stresses{self._beside_fibres} differ from the draw's by (root mean square; largest, of all draws) "
@@ -119,6 +129,15 @@ class JudgedLaw:
     @property
     def _beside_fibres(self) -> str:
         return "" if self.law.material.is_isotropic else " (all but that of the fibres, which is exact)"
+
+    def _wrong_cards(self) -> Iterator[str]:
+        wrong = np.flatnonzero(self.sizes > TOO_FAR)
+        if len(wrong):
+            ends = dict.fromkeys(map(_percent, (self.sizes[wrong].min(), self.sizes[wrong].max())))
+            yield (
+                f"Do NOT compute with the cards of {named_draws(wrong)} of {len(self.stable)}: their stresses are off "
+                f"by {' to '.join(ends)} (root mean square over the states that were measured)."
+            )
 
     def _far_cards(self, rivals: Sequence[JudgedLaw]) -> Iterator[str]:
         far = np.flatnonzero(~self.is_near)

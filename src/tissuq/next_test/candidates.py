@@ -56,11 +56,13 @@ class Candidate:
     mode : str or LoadingMode
         Loading mode with one control; it may measure several stresses.
     stretch : (n,) array, dimensionless
-        Stretches to be set, or amounts of shear.
+        Stretches to be set, or amounts of shear; as an attribute each as often as there are tests.
     name : str
         Mode, range and number of points unless another is given.
     is_repeat : bool
         Whether it is one of the tests of the data again.
+    tests : int
+        How many tests are made at these stretches; those on other specimens are each on one of its own.
 
     Raises
     ------
@@ -78,8 +80,11 @@ class Candidate:
     stretch: FloatArray
     name: str
     is_repeat: bool
+    tests: int
 
-    def __init__(self, mode: str | LoadingMode, stretch: ArrayLike, name: str = "", is_repeat: bool = False) -> None:
+    def __init__(
+        self, mode: str | LoadingMode, stretch: ArrayLike, name: str = "", is_repeat: bool = False, tests: int = 1
+    ) -> None:
         mode = loading_mode(mode)
         if len(mode.controls) > 1:
             raise InputError(
@@ -89,9 +94,10 @@ class Candidate:
         default_name = _name(mode, float(points.min()), float(points.max()), len(points))
         for field, value in (
             ("mode", mode),
-            ("stretch", points),
+            ("stretch", np.repeat(points, tests)),
             ("name", name or default_name),
             ("is_repeat", is_repeat),
+            ("tests", tests),
         ):
             object.__setattr__(self, field, value)
 
@@ -171,7 +177,7 @@ def _repeats(data: Experiment) -> Iterator[Candidate]:
         for times, words in REPEATS.items():
             suffix = f" ({test.name})" if len(tests) > 1 else ""
             name = f"{words}{suffix}, {times * len(test)} points"
-            yield Candidate(test.mode, np.tile(test.stretch, times), name, is_repeat=True)
+            yield Candidate(test.mode, test.stretch, name, is_repeat=True, tests=times)
 
 
 def _ranges(data: Experiment, mode: LoadingMode) -> Iterator[tuple[float, float]]:

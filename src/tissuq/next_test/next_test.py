@@ -108,7 +108,7 @@ class NextTest:
             variances = expected_variances(mixture, noise_sd, self._uniforms(number, mixture, noise_sd))
             centre = (mixture.weights @ mixture.mean)[noise_sd.shape[1] :] - self._offsets
             prior, expected = (
-                variance + self._common_error(self.errors_after) ** 2 * (variances.prior + centre**2)
+                variance + self._common_error(self.errors_after(candidate.tests)) ** 2 * (variances.prior + centre**2)
                 for variance in (variances.prior, variances.expected)
             )
             ratios.append(expected / prior)
@@ -144,12 +144,11 @@ class NextTest:
             return self.model.common_error
         return self.tolerances.in_common(self.model.experiment)
 
-    @property
-    def errors_after(self) -> float:
-        """The same after a further test."""
+    def errors_after(self, tests: int) -> float:
+        """Return the same after so many further tests."""
         if self.specimen == "same":
             return self.errors_now
-        spreads = [size / np.sqrt(count + 1) for size, count in self._spreads]
+        spreads = [size / np.sqrt(count + tests) for size, count in self._spreads]
         return float(np.linalg.norm(spreads))
 
     @property
@@ -213,7 +212,8 @@ class NextTest:
 
     def _mixture(self, components: GaussianMixture, candidate: Candidate) -> tuple[GaussianMixture, FloatArray]:
         """Return the candidate's measurements followed by the targets, and the noise (M, n) of the former."""
-        points, share = _thinned(candidate.stretch)
+        of_one, share = _thinned(candidate.stretch[:: candidate.tests], MAX_POINTS // candidate.tests)
+        points = np.repeat(of_one, candidate.tests)
         mean, root = self._stresses(components, [(candidate, points)])
         count = len(points) * len(candidate.mode.stresses)
         target_mean, target_root = self._targets(components, mean, root)
@@ -222,7 +222,7 @@ class NextTest:
         noise_sd = self._noise(components, candidate, points, curve)
         if self.specimen == "other":
             test = self._error_points(components, candidate, points, curve)
-            columns = list(self._errors_of_specimen(test, mean, target_mean - self._offsets))
+            columns = list(self._errors_of_specimens(test, mean, target_mean - self._offsets, candidate.tests))
             root = np.concatenate([root, *(column[:, :, None] for column, _ in columns)], axis=2)
             target_root = np.concatenate([target_root, *(column[:, :, None] for _, column in columns)], axis=2)
             noise_sd = np.hypot(noise_sd, self.tolerances.noise(test))
@@ -257,21 +257,27 @@ class NextTest:
         total = variance + _scatter(model, components)[:, None] ** 2
         return np.asarray(np.sqrt(np.broadcast_to(total, (len(components.weights), len(curve)))))
 
-    def _errors_of_specimen(self, test: ErrorPoints, mean: FloatArray, target_mean: FloatArray) -> Iterator[Column]:
-        """Yield the effects of standard errors of a new specimen on its stresses (M, n) and on the targets (M, t).
+    def _errors_of_specimens(
+        self, test: ErrorPoints, mean: FloatArray, target_mean: FloatArray, tests: int
+    ) -> Iterator[Column]:
+        """Yield the effects of standard errors of m new specimens on their stresses (M, n) and on the targets (M, t).
 
-        With e the errors of stress of K + 1 specimens, or tests, the data determine the tissue's stress times 1 + the
-        mean of K. The new stress is that times 1 + d, d = e_new - mean of K, and the mean of K + 1 is that of K plus
-        d / (K + 1).
+        With e the errors of stress of K + m specimens, or tests, the data determine the tissue's stress times 1 + the
+        mean of K. A new stress is that times 1 + d, d = e_new - mean of K, and the mean of K + m is that of K plus the
+        sum of d / (K + m). Of m tests at the same points one follows the other at each of these.
         """
+        of_tests = [np.arange(mean.shape[1]) % tests == number for number in range(tests)]
         for size, count in self._spreads:
-            sd = size * np.sqrt(1 + 1 / count)
-            if sd:
-                yield mean * sd, target_mean * self._common_error(sd / (count + 1))
+            if size:
+                of_mean, share = size / np.sqrt(count), 1 / (count + tests)
+                yield -of_mean * mean, target_mean * self._common_error(-of_mean * tests * share)
+                for is_of_test in of_tests:
+                    yield size * mean * is_of_test, target_mean * self._common_error(size * share)
         columns = [self.tolerances.columns(test, shared) for shared in ("specimen", "test")]
         for column in np.hstack(columns).T:
             if column.any():
-                yield np.broadcast_to(column, mean.shape), np.zeros_like(target_mean)
+                for is_of_test in of_tests:
+                    yield np.broadcast_to(column * is_of_test, mean.shape), np.zeros_like(target_mean)
 
     def _check_candidate(self, candidate: Candidate, label: str) -> None:
         """Refuse a test or a stress that the posterior does not determine."""
@@ -323,9 +329,9 @@ def _scatter(model: StatisticalModel, components: GaussianMixture) -> FloatArray
     return np.asarray(np.sqrt(np.broadcast_to(model.independent_variance(values), len(components.weights))))
 
 
-def _thinned(points: FloatArray) -> tuple[FloatArray, float]:
-    """Return at most `MAX_POINTS` of the points, evenly thinned, and their number over that of all."""
-    if len(points) <= MAX_POINTS:
+def _thinned(points: FloatArray, most: int) -> tuple[FloatArray, float]:
+    """Return at most so many of the points, evenly thinned, and their number over that of all."""
+    if len(points) <= most:
         return points, 1.0
-    selected = np.sort(points)[((np.arange(MAX_POINTS) + 0.5) / MAX_POINTS * len(points)).astype(int)]
-    return selected, MAX_POINTS / len(points)
+    selected = np.sort(points)[((np.arange(most) + 0.5) / most * len(points)).astype(int)]
+    return selected, most / len(points)

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 PREDICTING = "predict a new specimen"
-NOT_PREDICTED = "its stress is not predicted in the modes that were measured"
+NOT_PREDICTED = "its stress cannot be predicted in the modes that were measured; 'Stress of a new specimen' says why"
 CONTRADICTING = "the tests of most specimens contradict each other, so that moduli may be those of none of them"
 DEPARTING = "the fitted curves of most specimens depart from the measured ones, and the intervals do not include that"
 

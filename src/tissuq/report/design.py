@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from math import isnan
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,8 @@ FEW_TIES = 2
 """Tests that are named as being as good as the best; of others their number."""
 FEW_ROWS, WIDTH = 6, 9.5
 """Number of tests in the figure beside the answer, and width of that of all, inches."""
+LETTERS_PER_INCH, LINE = 7, 0.2
+"""Of a line of a test's name, for each inch of the figure's width, and height of a line, inches."""
 CAPTION = (
     "Expected standard deviation after each test, the best on top. Lines reach from it to the standard deviation now; "
     "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
@@ -106,11 +109,12 @@ def design_figure(study: DesignStudy) -> Figure:
 
 def _figure(study: DesignStudy, targets: Sequence[Target], limit: int, width: float) -> Figure:
     shown = [_shown(_rows_of(study, target), limit) for target in targets]
-    height = 1.5 + 0.3 * max(map(len, shown))
+    letters = int(LETTERS_PER_INCH * width)
+    height = 1.5 + max(sum(0.1 + LINE * len(_lines(name, letters)) for name in table["candidate"]) for table in shown)
     with new_figure(width, 0.4 + height * len(shown)) as figure:
         axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
         for axis, target, table in zip(axes, targets, shown, strict=True):
-            _panel(axis, study, target, table)
+            _panel(axis, study, target, table, letters)
         marks: list[Any] = [axes[0].plot([], [], "o", color=color)[0] for color in (BAND, BEYOND, BASE)]
         words = ["within the measured I1 and I2", "beyond", "repeats of the tests of the data"]
         figure.legend(marks, words, loc="outside lower right", ncols=3 if width == WIDTH else 1, fontsize=9)
@@ -240,8 +244,12 @@ def _shown(table: pd.DataFrame, limit: int) -> pd.DataFrame:
     return ranked[ranked["is_repeat"].to_numpy() | (ranks < limit)]
 
 
-def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) -> None:
-    """Draw the tests of one target."""
+def _lines(name: str, letters: int) -> list[str]:
+    return wrap(name, letters, break_on_hyphens=False)
+
+
+def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame, letters: int) -> None:
+    """Draw the tests of one target, their names in lines of so many letters."""
     factor, unit = _unit(study, target)
     sd_now, heights = float(table["sd_now"].iloc[0]) / factor, np.arange(len(table))[::-1]
     for height, (_, row) in zip(heights, table.iterrows(), strict=True):
@@ -251,7 +259,7 @@ def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) 
         axis.plot([sd_after - error, sd_after + error], [height, height], color=INK, lw=1.2)
         axis.plot(sd_after, height, "o", color="white" if row["is_rough"] else color, mec=color, ms=6)
     axis.axvline(sd_now, color=INK, lw=1)
-    axis.set_yticks(heights, [str(name) for name in table["candidate"]])
+    axis.set_yticks(heights, ["\n".join(_lines(name, letters)) for name in table["candidate"]])
     axis.set_ylim(-0.7, len(table) - 0.3)
     axis.set_xlim(0, 1.04 * sd_now)
     axis.locator_params(axis="x", nbins=4)

@@ -94,7 +94,8 @@ def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str
     if noise.parameters:
         return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "")
     values = [test.noise_sd for test in settings.tests if test.noise_sd is not None]
-    return f"sd {', '.join(f'{value:g}' for value in values) or f'{settings.noise_sd:g}'} {study.unit.name}"
+    sizes = ", ".join(f"{value:g}" for value in values) or f"{settings.noise_sd:g}"
+    return f"sd {sizes} {study.experiment.stress_unit}"
 
 
 def errors_in_words(tolerances: Tolerances, unit: StressUnit) -> str:

@@ -25,7 +25,13 @@ from tissuq.report.population_figures import (
     patient_figure,
     specimens_figure,
 )
-from tissuq.report.population_in_words import about_law, about_modulus, next_step_of, share_of_discrepancy
+from tissuq.report.population_in_words import (
+    about_law,
+    about_modulus,
+    next_step_of,
+    share_of_discrepancy,
+    use_of_law_alone,
+)
 from tissuq.report.population_tables import (
     effects_of_covariates,
     needed_of,
@@ -120,6 +126,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     words, predicted = headline(population)[0], [_band(of_mode) for of_mode, _ in bands.values()]
     quantity = "modulus" if words == MODULUS else words
     uses = uses_of_population(population, predicted, study.warnings, quantity, study.at_rest)
+    uses = (*uses, use_of_law_alone(share, uses[-1]))
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",

@@ -8,14 +8,14 @@ import numpy as np
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.shares import shares_of_discrepancy
-from tissuq.assessment.uses import PRECISE, Use, Verdict
+from tissuq.assessment.uses import COMPUTING, PRECISE, Use, Verdict
 from tissuq.population import Population
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING, share_of_initial_stiffness
 from tissuq.population.warnings import far_specimens
 from tissuq.report.population_figures import MODULUS
 from tissuq.result_warning import has_code
 
-__all__ = ["about_law", "about_modulus", "next_step_of", "share_of_discrepancy"]
+__all__ = ["about_law", "about_modulus", "next_step_of", "share_of_discrepancy", "use_of_law_alone"]
 
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
@@ -85,6 +85,24 @@ def next_step_of(
             "sets them apart (--covariates)"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
+
+
+def use_of_law_alone(share: float, predicting: Use) -> Use:
+    """Return whether a new specimen serves further computations, which have the law alone.
+
+    Parameters
+    ----------
+    share : float
+        Of the stress which the discrepancy carries.
+    predicting : Use
+        Of the stress of a new specimen where others were measured.
+    """
+    if share > PRECISE:
+        carried = f"which carries {100 * share:.0f} % of the stress (median of the specimens)"
+        return Use(COMPUTING, Verdict.NO, f"cards and predictions leave out the discrepancy, {carried}")
+    if predicting.reason == NOT_PREDICTED:
+        return Use(COMPUTING, Verdict.CARE, "how well its stress is known was not computed")
+    return predicting._replace(purpose=COMPUTING)
 
 
 def about_law(population: Population, share: float) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.uses import UNKNOWN, Use
+from tissuq.assessment.uses import COMPUTING, UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
@@ -131,7 +131,7 @@ def _use_of_mode(prediction: Prediction, run: Path) -> tuple[Use, ...]:
         return ()
     is_measured = prediction.mode in prediction.posterior.model.experiment.modes
     purpose = "predict these tests" if is_measured else "predict other loading modes"
-    return tuple(use for use in uses if use.purpose.startswith(purpose))
+    return tuple(use for use in uses if use.purpose.startswith((purpose, COMPUTING)))
 
 
 def _stresses_at_the_end(prediction: Prediction) -> list[Number]:

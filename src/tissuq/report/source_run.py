@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.assessment.uses import Use, Verdict
+from tissuq.assessment.uses import COMPUTING, Use, Verdict
 from tissuq.errors import InputError
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.report.result import RESULT
@@ -33,7 +33,7 @@ SOURCE = "source"
 SPOILING = ("not-converged", "doubtful-reading", "stress-at-rest", "tests-apart", "contradicting-tests",
             "unmodelled-curve", "measurements")  # fmt: skip
 """Codes of warnings about what a fit says of the tissue, and not about how exactly."""
-SIMULATING, USE_OF_FIT = "simulate with finite elements", "use of the fit in finite elements"
+SIMULATING, USE_OF_FIT = ("simulate with finite elements", COMPUTING), "use of the fit in finite elements"
 LAW_OF_USE = ", with "
 """What stands before the law in a use that a comparison of laws says of one of them."""
 
@@ -45,7 +45,7 @@ class Said:
     Attributes
     ----------
     use : Use or None
-        Whether it serves finite elements; None where it says nothing, as a population does.
+        Whether it serves finite elements; None where it says nothing.
     warnings : tuple of ResultWarning
         Those that hold for it, too.
     next_step : str
@@ -54,6 +54,11 @@ class Said:
     use: Use | None = None
     warnings: tuple[ResultWarning, ...] = ()
     next_step: str = ""
+
+    @property
+    def of_cards(self) -> str:
+        """What stands in cards of its draws; nothing where it says nothing."""
+        return f"{self.use.purpose}: {self.use.verdict.upper()}, {self.use.reason}" if self.use else ""
 
     @property
     def advice(self) -> str:

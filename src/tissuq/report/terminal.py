@@ -12,7 +12,7 @@ from tissuq.experiments.numbers import wrapped
 from tissuq.report.result import Record, TableRecord, UseRecord, few_and_others
 from tissuq.result_warning import Severity, in_shell
 
-__all__ = ["print_explanations", "print_result", "print_rows", "print_warnings"]
+__all__ = ["print_explanations", "print_next", "print_result", "print_rows", "print_uses", "print_warnings"]
 
 TEXT_WIDTH = 96
 """Letters in a line of prose, and at least in one of a table."""
@@ -25,7 +25,8 @@ PROSE = 40
 def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table whose first column is text and whose others are numbers, in lines as wide as the terminal.
 
-    Cells of prose are wrapped. Columns that do not fit beside one another stand beneath, each time with the first one.
+    Cells of prose are wrapped. Columns that do not fit beside one another stand beneath, each time with as many of the
+    first ones as tell the rows apart.
     """
     from rich.box import SIMPLE_HEAD
     from rich.cells import cell_len
@@ -37,7 +38,7 @@ def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]
     longest = [max(map(cell_len, map(str, cells))) for cells in zip(headers, *rows, strict=True)]
     is_prose = [length > PROSE for length in longest]
     widths = [PROSE if prose else length for length, prose in zip(longest, is_prose, strict=True)]
-    for number, columns in enumerate(_side_by_side(widths, available)):
+    for number, columns in enumerate(_side_by_side(widths, available, _telling_apart(rows))):
         table = Table(title=title * (not number), title_justify="left", title_style="bold", box=SIMPLE_HEAD,
                       padding=(0, 1, 0, 0), pad_edge=False)  # fmt: skip
         for index in columns:
@@ -50,13 +51,20 @@ def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]
         console.print(table)
 
 
-def _side_by_side(widths: Sequence[int], available: int) -> list[list[int]]:
-    """Return which columns stand beside one another where a line has so many letters; the first one in any case."""
-    blocks, filled = [[0]], widths[0] + GAP
-    for index, width in enumerate(widths[1:], 1):
-        if filled + width + GAP > available and len(blocks[-1]) > 1:
-            blocks.append([0])
-            filled = widths[0] + GAP
+def _telling_apart(rows: Sequence[Sequence[str]]) -> int:
+    """Return how many of the first columns tell rows apart; one where not even all do."""
+    counts = range(1, len(rows[0]) if rows else 1)
+    return next((count for count in counts if len({tuple(row[:count]) for row in rows}) == len(rows)), 1)
+
+
+def _side_by_side(widths: Sequence[int], available: int, first: int) -> list[list[int]]:
+    """Return which columns stand beside one another where a line has so many letters, each time so many first ones."""
+    start, filled_first = list(range(first)), sum(widths[:first]) + GAP * first
+    blocks, filled = [start.copy()], filled_first
+    for index, width in enumerate(widths[first:], first):
+        if filled + width + GAP > available and len(blocks[-1]) > first:
+            blocks.append(start.copy())
+            filled = filled_first
         blocks[-1].append(index)
         filled += width + GAP
     return blocks
@@ -95,9 +103,9 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
         print(wrapped(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
     if record["uses"]:
         print()
-    _print_uses(record["uses"])
+    print_uses(record["uses"])
     if record["next"]:
-        _print_next(record["next"], folder)
+        print_next(record["next"], folder)
     for table in record["tables"]:
         _print_table(table)
     for warning in shown:
@@ -130,7 +138,7 @@ def _print_numbers(numbers: Sequence[Mapping[str, Any]]) -> None:
                       subsequent_indent=" " * len(start), break_on_hyphens=False))  # fmt: skip
 
 
-def _print_uses(uses: Sequence[UseRecord]) -> None:
+def print_uses(uses: Sequence[UseRecord]) -> None:
     """Print for what a result can be used, with the verdict in front."""
     width = max((len(use["verdict"]) for use in uses), default=0)
     for use in uses:
@@ -139,7 +147,7 @@ def _print_uses(uses: Sequence[UseRecord]) -> None:
                    subsequent_indent=" " * len(start)))  # fmt: skip
 
 
-def _print_next(step: str, folder: Path | None) -> None:
+def print_next(step: str, folder: Path | None = None) -> None:
     """Print what to do next, with the folder of the run where the step names it."""
     words = _plain(step).replace("{run}", shlex.quote(str(folder)))
     print("\n" + wrapped(words, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))

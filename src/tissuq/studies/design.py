@@ -11,7 +11,7 @@ import numpy as np
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import loading_mode
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Material
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.candidates import Target, target_named
@@ -62,15 +62,16 @@ class DesignStudy:
 
     @property
     def unit(self) -> StressUnit:
-        """The unit of stress of the data."""
-        return stress_unit(self.posterior.model.experiment.stress_unit)
+        """The unit in which stresses are shown."""
+        return self.posterior.model.experiment.shown_unit
 
     @property
     def explanations(self) -> list[str]:
         """How to read the table."""
         whose = (
-            f"another specimen, whose stresses differ by about {100 * self.error:.0f} % as a whole; standard "
-            "deviations, now and after, are of the mean of the tissue's specimens"
+            f"another specimen (three more of the same: each on one of its own), whose stresses differ by about "
+            f"{100 * self.error:.0f} % as a whole; standard deviations, now and after, are of the mean of the tissue's "
+            "specimens"
             if self.specimen == "other"
             else "the same specimen, without additional test errors; for another specimen use --next-specimen other"
         )

@@ -32,7 +32,7 @@ PROGRAMS = {
     "LS-DYNA": (("lsdyna", "ls-dyna", "ls-dyna_smp_d"), "runs the cards of tissuq export --format ls-dyna"),
     "Chromium": (
         ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge"),
-        "prints reports (tissuq show RUN --pdf)",
+        "prints reports (tissuq show RUN --pdf FILE)",
     ),
     "ParaView": (("paraview",), "opens the fields that tissuq structure writes"),
 }

@@ -51,8 +51,8 @@ class LawStudy:
 
     @property
     def unit(self) -> StressUnit:
-        """The unit in which the file, or the first of several, gives stresses."""
-        return stress_unit(self.experiment.stress_unit)
+        """The unit in which stresses are shown."""
+        return self.experiment.shown_unit
 
     @property
     def meaning(self) -> str:

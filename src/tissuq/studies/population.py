@@ -45,8 +45,9 @@ class PopulationStudy:
 
     @property
     def unit(self) -> StressUnit:
-        """The unit in which the files give stresses; MPa where they differ."""
-        return _unit(self.tests)
+        """The unit in which stresses are shown: that of the files, MPa where they differ, or a smaller one."""
+        largest = max(abs(test.measured).max() for of_one in self.tests.values() for test in of_one)
+        return _unit(self.tests).readable(float(largest))
 
     @property
     def modes(self) -> tuple[LoadingMode, ...]:

@@ -191,7 +191,8 @@ def _beside(ends: tuple[float, float], mode: LoadingMode, measured: FloatArray) 
 def _scores(posterior: Posterior, data: Experiment, kinds: tuple[bool, ...], options: dict[str, Any]) -> pd.DataFrame:
     import pandas as pd
 
-    tables = {kind: posterior.scores(data, discrepancy=kind, **options) for kind in kinds}
+    unit = posterior.model.experiment.shown_unit.name
+    tables = {kind: posterior.scores(data, discrepancy=kind, unit=unit, **options) for kind in kinds}
     for kind, table in tables.items():
         table.insert(3, "discrepancy", "with" if kind else "without")
     return pd.concat(tables.values(), ignore_index=True)

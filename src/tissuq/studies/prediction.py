@@ -17,7 +17,7 @@ from tissuq.drawing.panels import panels
 from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import ways_of
 from tissuq.pictures.prediction import Measured, Predicted, draw_predicted, predicted_limits
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
@@ -81,8 +81,8 @@ class Prediction:
 
     @property
     def unit(self) -> StressUnit:
-        """The unit in which the run's measurements give stresses."""
-        return stress_unit(self.posterior.model.experiment.stress_unit)
+        """The unit in which stresses are shown."""
+        return self.posterior.model.experiment.shown_unit
 
     @cached_property
     def bands(self) -> Mapping[tuple[int, bool, bool], pd.DataFrame]:
