@@ -13,7 +13,7 @@ from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import HOW_TO_READ_TUBE, PRESSURE, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.uneven_stress import SAME_STRETCH, Tube, rows_at_each_stretch
+from tissuq.experiments.reading.tube import SAME_STRETCH, Tube, rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import strain_factor
 
@@ -76,7 +76,9 @@ def axial_stretch_of(
     """
     given, is_tube = options.get("axial_stretch"), choices[0].load == PRESSURE
     if isinstance(mode, InflatedTube):
-        return _required(table, given, options)
+        axial = _required(table, given, options)
+        _check_held(table, axial.values)
+        return axial
     if not is_tube:
         if given is not None or ROLE_OF_AXIAL_STRETCH in (options.get("columns") or {}):
             raise InputError(
@@ -126,6 +128,18 @@ def _required(table: Table, given: float | None, options: ReadingOptions) -> Axi
             f"{given:g}. Leave that out, or the column out of the file."
         )
     return AxialStretch(np.full(len(values), float(given)), f"axial stretch {given:g} (as given)")
+
+
+def _check_held(table: Table, axial_stretch: Column) -> None:
+    """Refuse an axial stretch that goes on during an inflation of which pressure and diameter are all that is known."""
+    for rows in rows_at_each_stretch(axial_stretch):
+        if np.ptp(axial_stretch[rows]) > 2 * SAME_STRETCH:
+            raise InputError(
+                f"{table.file}: the axial stretch changes from {axial_stretch[rows].min():.4g} to "
+                f"{axial_stretch[rows].max():.4g} while the tube is inflated. Without the axial force the stress in "
+                "its wall follows only at an axial stretch that is held, at one or at several in turn: leave rows out "
+                "with --leave-out."
+            )
 
 
 def _numbers(table: Table, column: int) -> Column:

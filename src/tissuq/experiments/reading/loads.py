@@ -16,7 +16,7 @@ from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import FIRST_ROW
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.uneven_stress import apparent_stress
+from tissuq.experiments.reading.twisted_disc import apparent_stress
 from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
 
 __all__ = ["Load", "force_in", "stress_of", "without_zero"]

@@ -16,7 +16,7 @@ from tissuq.experiments.branches import REVERSAL, turning_points
 from tissuq.experiments.reading.disturbances import ends_of_rests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
-from tissuq.experiments.reading.uneven_stress import rows_at_each_stretch
+from tissuq.experiments.reading.tube import rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
