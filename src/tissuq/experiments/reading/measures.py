@@ -230,7 +230,6 @@ def measure_of_tube(tube: Tube) -> StressMeasure:
         name="inflation",
         words="",
         engineering=lambda mode, points, loads: _in_middle_of_wall(tube, points, loads),
-        step="mean stress of the wall times the hoop stretch (and the axial stretch, where that is not 1), and times "
-        "the stress in its middle over the mean, to engineering stress",
+        step="from mean stresses of the wall to engineering stress in its middle, by a mixture of laws that bears them",
         is_of_file=True,
     )

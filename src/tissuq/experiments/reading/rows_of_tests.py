@@ -11,9 +11,8 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.numbers import NUMBER
-from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, is_of_specimens, plain
-from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice, find_column
 from tissuq.experiments.reading.stated_mode import modes_in_column
 from tissuq.experiments.reading.table import Column, Table, filled_on
 from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, CYCLE_NAMES, SET_NAMES

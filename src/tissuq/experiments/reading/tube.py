@@ -25,6 +25,8 @@ SAME_STRETCH = 0.01
 """Difference of axial stretches up to which they count as one."""
 LARGEST_MISFIT = 0.5
 """Share of loads that no wall bears, from which a sign or a column is wrong."""
+NOTABLE_MISFIT = 0.1
+"""Share from which they are doubted."""
 LITTLE_STRESS = 0.1
 """Share of the largest stress up to which the ratio of that in the middle to the mean says nothing."""
 NOT_WIDER = "the tube is not wider where the pressure is larger: check which columns are read."
@@ -74,7 +76,7 @@ class Tube:
             return ""
         return (
             f"The wall is {self.relative_thickness:.2g} times as thick as the radius of its middle, beyond the "
-            f"{THICKEST:g} up to which the stress there is known to be right within 1 %."
+            f"{THICKEST:g} up to which the stress there is known to be right within about 1 %."
         )
 
     @property
@@ -110,6 +112,11 @@ class Tube:
             )
         return np.asarray(np.sqrt((1 + square) / axial_stretch))
 
+    def of_ends(self, hoop: FloatArray, axial: FloatArray, pressure: FloatArray) -> FloatArray:
+        """Return the force of the pressure on the closed ends, pi a^2 p over the cross-section (n,), for p/ln(B/A)."""
+        inner_square = (self.inner**2 + self.middle**2 * (axial * hoop**2 - 1)) / axial
+        return np.asarray(pi * inner_square * pressure * self.log_ratio / self.section)
+
     def engineering_stresses(self, hoop: FloatArray, axial: FloatArray, loads: FloatArray) -> FloatArray:
         """Return the engineering stresses (k, n) in the middle of the wall: around it, and along it if k is 2.
 
@@ -129,16 +136,35 @@ class Tube:
         InputError
             When no wall bears such loads.
         """
-        laws, moduli = self._fitted(hoop, axial, loads)
+        laws, moduli, misfit = self._fitted(hoop, axial, loads)
+        has_force = len(loads) > 1
+        if has_force and misfit > NOTABLE_MISFIT and self._fitted(hoop, axial, _turned(loads))[2] < misfit / 3:
+            raise InputError(OTHER_SIGN)
+        if misfit > LARGEST_MISFIT:
+            raise InputError(NO_WALL if has_force else NOT_WIDER)
         means, in_middle = self._loads(hoop, axial, laws) @ moduli, laws.slopes(hoop, axial) @ moduli
         around = _moved(loads[0] * axial * hoop, means[0] * axial * hoop, in_middle[0])
-        if len(loads) == 1:
+        if not has_force:
             return around[None]
         along = loads[1] + hoop * around / (2 * axial)
         return np.stack([around, _moved(along, means[1] + hoop * in_middle[0] / (2 * axial), in_middle[1])])
 
-    def _fitted(self, hoop: FloatArray, axial: FloatArray, loads: FloatArray) -> tuple[LawMixture, FloatArray]:
-        """Return the laws whose moduli are not zero, and these."""
+    def doubt(self, hoop: FloatArray, axial: FloatArray, loads: FloatArray) -> str:
+        """Return by how much loads (2, n) differ from those that a wall bears, whatever the sign of the force.
+
+        An empty text where that is no more than errors of a test are. Pressure and force at all stretches follow from
+        one energy, which those of another force or of another tube hardly do.
+        """
+        misfit = min(self._fitted(hoop, axial, of_sign)[2] for of_sign in (loads, _turned(loads)))
+        if misfit <= NOTABLE_MISFIT:
+            return ""
+        return (
+            f"pressure and force differ by {100 * misfit:.0f} % from those that a wall of one elastic material bears "
+            "at these stretches: check which force the file holds, the sizes of the tube, and its axial stretch."
+        )
+
+    def _fitted(self, hoop: FloatArray, axial: FloatArray, loads: FloatArray) -> tuple[LawMixture, FloatArray, float]:
+        """Return the laws whose moduli are not zero, these, and the share of the loads that they leave."""
         thinned = slice(None, None, 1 + len(hoop) // MOST_ROWS)
         hoop, axial, loads = hoop[thinned], axial[thinned], loads[:, thinned]
         stresses = loads[0], loads[-1] + loads[0] * hoop**2 / 2  # a force may be little beside the pressure on the ends
@@ -147,12 +173,8 @@ class Tube:
         inside = np.sqrt((1 + (axial * hoop**2 - 1) * self.outer / self.inner) / axial)
         laws = EVERY_LAW.taken(EVERY_LAW.are_known(np.append(hoop, inside), np.append(axial, axial)))
         columns = (self._loads(hoop, axial, laws)[: len(loads)] / sizes[..., None]).reshape(loads.size, -1)
-        measured = loads / sizes
-        moduli, misfit = not_negative(columns, measured.ravel())
-        if misfit > LARGEST_MISFIT:
-            is_turned = len(loads) > 1 and not_negative(columns, (measured * [[1], [-1]]).ravel())[1] < misfit / 2
-            raise InputError(OTHER_SIGN if is_turned else NOT_WIDER if len(loads) == 1 else NO_WALL)
-        return laws.taken(moduli > 0), moduli[moduli > 0]
+        moduli, misfit = not_negative(columns, (loads / sizes).ravel())
+        return laws.taken(moduli > 0), moduli[moduli > 0], misfit
 
     def _loads(self, hoop: FloatArray, axial: FloatArray, laws: LawMixture) -> FloatArray:
         """Return the pressure over ln(B/A) and the force over the cross-section (2, n, k) of laws of modulus one."""
@@ -164,6 +186,11 @@ class Tube:
         pressure = np.einsum("nqk,nq->nk", around, WEIGHTS / 2 / (through * held))
         force = np.einsum("nqk,q->nk", along, of_area)
         return np.stack([pressure, force - np.einsum("nqk,nq->nk", around, of_area * through / (2 * held))])
+
+
+def _turned(loads: FloatArray) -> FloatArray:
+    """Return a pressure and the force of the other sign."""
+    return loads * [[1], [-1]]
 
 
 def _moved(measured: FloatArray, mean: FloatArray, in_middle: FloatArray) -> FloatArray:
