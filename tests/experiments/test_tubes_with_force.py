@@ -13,6 +13,7 @@ from thick_tubes import (
     LAWS,
     MMHG,
     OUTER,
+    ROWS,
     SIZES,
     axial_slope,
     borne,
@@ -177,6 +178,49 @@ def test_a_pressure_may_be_held_while_the_tube_is_stretched(tmp_path):
     hoop, axial, _, _ = measured(fibres, held=())
     stress = stresses_of(fibres, hoop, axial)
     np.testing.assert_allclose(data.stress, stress, rtol=0, atol=0.003 * stress.max())
+
+
+def test_a_tube_may_be_stretched_without_pressure(tmp_path):
+    """As a rod: of 2 C10 (z - 1/z^2) along the axis, and of nothing around it."""
+    axial = np.linspace(1.05, 1.6, ROWS)
+    hoop = [hoop_at(neo_hookean, 0.0, stretch, INNER, OUTER) for stretch in axial]
+    force = [borne(neo_hookean, *point, INNER, OUTER)[1] for point in zip(hoop, axial, strict=True)]
+    diameter = 2 * radii(np.array(hoop), axial, INNER, OUTER)[1]
+    file = written(tmp_path, np.column_stack([0 * axial, 1e3 * diameter, axial, 1e3 * np.array(force)]))
+    stress = 0.04 * (axial - axial**-2)
+    expected = np.column_stack([0 * axial, stress])
+    np.testing.assert_allclose(tq.read(file, **SIZES).stress, expected, rtol=0, atol=1e-6 * stress.max())
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def with_label(folder, labels, name="Protocol"):
+    lines = written(folder, rows_of(fibres, at_rest=None)).read_text(encoding="utf-8").splitlines()
+    rows = [f"{line},{label}" for line, label in zip(lines[1:], np.repeat(labels, ROWS), strict=True)]
+    (folder / "labelled.csv").write_text("\n".join([f"{lines[0]},{name}", *rows]))
+    return folder / "labelled.csv"
+
+
+@pytest.mark.parametrize("labels", [["at 1.2", "at 1.4", "at 1.6"], [1, 2, 3]])
+def test_parts_of_a_protocol_are_one_test(tmp_path, labels):
+    assert len(tq.read(with_label(tmp_path, labels), **SIZES)) == 3 * ROWS
+
+
+def test_a_pressure_that_was_asked_for_parts_nothing(tmp_path):
+    """Of a tube that is stretched at several pressures in turn."""
+    pulls = [rows_of(fibres, held=(), at_rest=hoop) for hoop in (0.95, 1.0, 1.05)]
+    rows = np.concatenate([np.column_stack([pull, np.full(ROWS, pull[0, 0].round())]) for pull in pulls])
+    file = written(tmp_path, rows, f"{HEADINGS},Target pressure (mmHg)")
+    assert len(tq.read(file, **SIZES)) == 3 * ROWS
+
+
+def test_rows_of_several_vessels_are_told_apart(tmp_path):
+    with pytest.raises(InputError, match=r"names several tests: 'A', 'B'"):
+        tq.read(with_label(tmp_path, ["A", "A", "B"], "Specimen"), **SIZES)
+
+
+def test_few_rows_are_read(tmp_path, count):
+    rows = rows_of(fibres)[:: len(rows_of(fibres)) // count][:count]
+    assert len(tq.read(written(tmp_path, rows), **SIZES)) == count
 
 
 def test_the_force_of_the_whole_wall_is_less_by_that_of_the_pressure_on_the_ends(tmp_path):

@@ -160,7 +160,7 @@ class Tube:
             return ""
         return (
             f"pressure and force differ by {100 * misfit:.0f} % from those that a wall of one elastic material bears "
-            "at these stretches: check which force the file holds, the sizes of the tube, and its axial stretch."
+            "at these stretches: check which force the file holds, units, the sizes of the tube, and its axial stretch."
         )
 
     def _fitted(self, hoop: FloatArray, axial: FloatArray, loads: FloatArray) -> tuple[LawMixture, FloatArray, float]:
@@ -168,8 +168,8 @@ class Tube:
         thinned = slice(None, None, 1 + len(hoop) // MOST_ROWS)
         hoop, axial, loads = hoop[thinned], axial[thinned], loads[:, thinned]
         stresses = loads[0], loads[-1] + loads[0] * hoop**2 / 2  # a force may be little beside the pressure on the ends
-        largest = [max(float(np.abs(stress).max()), np.finfo(float).tiny) for stress in stresses[: len(loads)]]
-        sizes = np.array(largest)[:, None]
+        largest = np.array([np.abs(stress).max() for stress in stresses[: len(loads)]])[:, None]
+        sizes = np.where(largest > 0, largest, largest.max() or 1.0)
         inside = np.sqrt((1 + (axial * hoop**2 - 1) * self.outer / self.inner) / axial)
         laws = EVERY_LAW.taken(EVERY_LAW.are_known(np.append(hoop, inside), np.append(axial, axial)))
         columns = (self._loads(hoop, axial, laws)[: len(loads)] / sizes[..., None]).reshape(loads.size, -1)
