@@ -192,7 +192,16 @@ def test_a_tube_may_be_stretched_without_pressure(tmp_path):
     np.testing.assert_allclose(tq.read(file, **SIZES).stress, expected, rtol=0, atol=1e-6 * stress.max())
 
 
-@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("name", ["artery axial.csv", "tension-inflation.csv"])
+def test_columns_of_a_tube_go_before_words_in_the_name_of_its_file(tmp_path, name):
+    assert tq.read(written(tmp_path, rows_of(fibres), name=name), **SIZES).mode.name == "thin-tube"
+
+
+def test_a_comment_goes_before_columns_of_a_tube(tmp_path):
+    file = written(tmp_path, rows_of(fibres), f"# mode: inflated-tube\n{HEADINGS}")
+    assert tq.read(file, every=1, leave_out="78:102", **SIZES).mode.name == "inflated-tube"
+
+
 def with_label(folder, labels, name="Protocol"):
     lines = written(folder, rows_of(fibres, at_rest=None)).read_text(encoding="utf-8").splitlines()
     rows = [f"{line},{label}" for line, label in zip(lines[1:], np.repeat(labels, ROWS), strict=True)]
@@ -218,6 +227,7 @@ def test_rows_of_several_vessels_are_told_apart(tmp_path):
         tq.read(with_label(tmp_path, ["A", "A", "B"], "Specimen"), **SIZES)
 
 
+@pytest.mark.parametrize("count", [2, 3, 4])
 def test_few_rows_are_read(tmp_path, count):
     rows = rows_of(fibres)[:: len(rows_of(fibres)) // count][:count]
     assert len(tq.read(written(tmp_path, rows), **SIZES)) == count

@@ -114,18 +114,20 @@ def mode_of(
     """
     if (wanted := options.get("mode")) is not None:
         return wanted, GIVEN
-    mode, source = "", ""
+    mode, source, is_by_word = "", "", False
     for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
         if len(modes := modes_in_column(table, column)) == 1:
             mode, source = modes.pop(), f"column {table.label(column)}"
             break
     if not mode:
         mode, source = find_mode(file, [table.sheet, table.title, *words])
+        is_by_word = mode == DEFAULT_MODE and not mode_in_comment(Path(file))  # which a tube may be called, too: axial
     columns = options.get("columns") or {}
     if not mode and columns.keys() & {*SHEARS, "torque"}:
         mode, source = "simple-shear", "a column of shear"
-    if not (mode or options.get("axis")):
-        mode, source = mode_of_tube(table, options)
+    if (is_by_word or not mode) and not options.get("axis"):
+        of_tube = mode_of_tube(table, options)
+        mode, source = of_tube if of_tube[0] else (mode, source)
     if not mode and (options.get("axial_stretch") is not None or ROLE_OF_AXIAL_STRETCH in columns):
         mode, source = "inflated-tube", "an axial stretch"
     if not (mode or columns or options.get("axis")):
