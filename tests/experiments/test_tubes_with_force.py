@@ -329,3 +329,16 @@ def test_a_pressure_that_is_held_beside_a_force_is_no_tube_without_an_axial_stre
     rows = np.array([[0.01 * k, 2.0 * k, 100, 4 - 0.01 * k] for k in range(30)])
     file = written(tmp_path, rows, "Strain,Force (N),Pressure (kPa),Diameter (mm)")
     assert tq.read(file, area="10 mm2").mode.name == "uniaxial"
+
+
+def test_rows_that_are_left_out_raise_no_doubt(tmp_path):
+    rows = rows_of(fibres)
+    rows[40, 0] *= 5
+    file = written(tmp_path, rows)
+    assert any("elastic material bears" in note for note in tq.inspect(file, **SIZES).warnings)
+    assert not any("elastic material bears" in note for note in tq.inspect(file, leave_out="42", **SIZES).warnings)
+
+
+def test_stretches_beyond_all_numbers_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no wall bears such pressures and forces"):
+        tq.read(written(tmp_path, rows_of(fibres) * (1, 1e160, 1, 1)), **SIZES)

@@ -77,11 +77,9 @@ def measured_rows(
         stretch_steps.append(f"{step}{given_way}")
         note = note_of_tube(size.tube[0], axial) if choice.load == PRESSURE else stress.note
         loads.append(replace(stress, source=f"{stress.source}{counted}", note=note))
-    if axial is not None and len(columns) > 1:
-        (tube, _), at = sizes[-1].tube, (stretches[0], axial.values)
-        if columns[-1].load == TOTAL_FORCE:
-            loads[-1] = without_ends(loads[-1], tube.of_ends(*at, loads[0].stress))
-        loads[-1] = replace(loads[-1], note=tube.doubt(*at, np.stack([load.stress for load in loads])))
+    if columns[-1].load == TOTAL_FORCE and axial is not None:
+        tube, _ = sizes[-1].tube
+        loads[-1] = without_ends(loads[-1], tube.of_ends(stretches[0], axial.values, loads[0].stress))
     measured = MeasuredRows(
         table=table,
         rows=np.arange(len(table.rows)),

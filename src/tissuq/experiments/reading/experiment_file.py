@@ -344,9 +344,10 @@ def read_rows(
     if options.get("relaxed"):
         used = used.relaxed()
     check_stretches(used, choices)
-    stress_measure = loads[0].measure or stress_measure_of(table, choices)
+    stress_measure, doubt = loads[0].measure or stress_measure_of(table, choices), ""
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
+        doubt = stress_measure.doubt(points_of(mode, used, of_file), used.stress)
         recorded, used = (
             with_engineering_stress(mode, stress_measure, measured, points_of(mode, measured, stretch))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
@@ -372,7 +373,7 @@ def read_rows(
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
     problems = (spread.problem for spread in spreads if spread.problem)
     doubts = *assumptions(used, choices, options), *dimensions.averages, *dimensions.contradictions
-    about_loads = filter(None, (load.note for load in loads))
+    about_loads = filter(None, (doubt, *(load.note for load in loads)))
     notes = *table.notes, *problems, *about_loads
     return Reading(
         experiment,

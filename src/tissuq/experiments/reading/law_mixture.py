@@ -53,12 +53,13 @@ class LawMixture:
         return np.stack([np.stack(measures, axis=-1).imag / STEP @ self.shares * factor for measures in moved])
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _measures(hoop: Any, axial: Any) -> list[Any]:
     """Return what energies are functions of, all zero in the undeformed wall."""
     a, b = hoop**2, axial**2
     first, second = a + b + 1 / (a * b) - 3, 1 / a + 1 / b + a * b - 3
     around, along = a - 1, b - 1
-    powers = (hoop**k + axial**k + (hoop * axial) ** -float(k) - 3 for k in EXPONENTS)
+    powers = [hoop**k + axial**k + (hoop * axial) ** -float(k) - 3 for k in EXPONENTS]
     return [first, second, first**2, around**2, along**2, 2 * around * along, *powers]
 
 
@@ -88,6 +89,8 @@ def not_negative(columns: FloatArray, measured: FloatArray) -> tuple[FloatArray,
     """
     from scipy.optimize import nnls
 
+    if not columns.size:  # with which SciPy's function ends the program
+        return np.zeros(columns.shape[1]), 1.0
     lengths = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     factors, misfit = nnls(columns / lengths, measured)
     return factors / lengths, float(misfit) / max(float(np.linalg.norm(measured)), np.finfo(float).tiny)

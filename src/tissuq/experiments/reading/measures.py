@@ -166,6 +166,8 @@ class StressMeasure:
         How, in words.
     is_of_file : bool
         Whether stretches count from where they do in the file, and not from where a preload makes the specimen taut.
+    doubt : callable, optional
+        What is doubtful about such stresses (k, n) at points of the mode, in words; an empty text where nothing is.
     """
 
     name: str
@@ -173,6 +175,7 @@ class StressMeasure:
     engineering: Callable[[LoadingMode, FloatArray, FloatArray], FloatArray] | None = None
     step: str = ""
     is_of_file: bool = False
+    doubt: Callable[[FloatArray, FloatArray], str] = lambda points, stress: ""
 
 
 def _from_cauchy(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> FloatArray:
@@ -219,9 +222,9 @@ STRESS_MEASURES = {
 volume), and 2 T / (pi R^3) of the torque T of a disc with the radius R."""
 
 
-def _in_middle_of_wall(tube: Tube, points: FloatArray, loads: FloatArray) -> FloatArray:
+def _hoop_and_axial(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     hoop, axial = (points, np.ones(len(points))) if points.ndim == 1 else np.moveaxis(points, -1, 0)
-    return tube.engineering_stresses(hoop, axial, loads)
+    return hoop, axial
 
 
 def measure_of_tube(tube: Tube) -> StressMeasure:
@@ -229,7 +232,8 @@ def measure_of_tube(tube: Tube) -> StressMeasure:
     return StressMeasure(
         name="inflation",
         words="",
-        engineering=lambda mode, points, loads: _in_middle_of_wall(tube, points, loads),
+        engineering=lambda mode, points, loads: tube.engineering_stresses(*_hoop_and_axial(points), loads),
         step="from mean stresses of the wall to engineering stress in its middle, by a mixture of laws that bears them",
         is_of_file=True,
+        doubt=lambda points, loads: tube.doubt(*_hoop_and_axial(points), loads),
     )

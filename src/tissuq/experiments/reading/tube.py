@@ -150,13 +150,12 @@ class Tube:
         return np.stack([around, _moved(along, means[1] + hoop * in_middle[0] / (2 * axial), in_middle[1])])
 
     def doubt(self, hoop: FloatArray, axial: FloatArray, loads: FloatArray) -> str:
-        """Return by how much loads (2, n) differ from those that a wall bears, whatever the sign of the force.
+        """Return by how much loads (k, n) differ from those that a wall bears; an empty text where that is little.
 
-        An empty text where that is no more than errors of a test are. Pressure and force at all stretches follow from
-        one energy, which those of another force or of another tube hardly do.
+        Pressure and force at all stretches follow from one energy, which those of another force or of another tube
+        hardly do. A pressure alone tells nothing.
         """
-        misfit = min(self._fitted(hoop, axial, of_sign)[2] for of_sign in (loads, _turned(loads)))
-        if misfit <= NOTABLE_MISFIT:
+        if len(loads) == 1 or (misfit := self._fitted(hoop, axial, loads)[2]) <= NOTABLE_MISFIT:
             return ""
         return (
             f"pressure and force differ by {100 * misfit:.0f} % from those that a wall of one elastic material bears "
