@@ -10,68 +10,27 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import tissuq as tq
+from thick_tubes import (
+    INNER,
+    LAWS,
+    MMHG,
+    OUTER,
+    SIZES,
+    demiray,
+    fibres,
+    gent,
+    mooney_rivlin,
+    neo_hookean,
+    ogden,
+    slope,
+    wall,
+    yeoh,
+)
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.reading.uneven_stress import Tube
-
-MMHG = 133.322387415e-6  # MPa
-INNER, OUTER = 1.25, 1.5  # mm
-SIZES = {"diameter": "3 mm", "thickness": "0.25 mm"}
-ROWS = 31
-
-
-def first_invariant(hoop, axial):
-    return hoop**2 + axial**2 + 1 / (hoop * axial) ** 2
-
-
-def neo_hookean(hoop, axial):
-    """W = 20 kPa (I1 - 3)."""
-    return 0.02 * (first_invariant(hoop, axial) - 3)
-
-
-def mooney_rivlin(hoop, axial):
-    """With C01 = 5 kPa."""
-    return neo_hookean(hoop, axial) + 0.005 * (1 / hoop**2 + 1 / axial**2 + (hoop * axial) ** 2 - 3)
-
-
-def yeoh(hoop, axial):
-    """With C20 = 20 kPa."""
-    return neo_hookean(hoop, axial) + 0.02 * (first_invariant(hoop, axial) - 3) ** 2
-
-
-def ogden(hoop, axial):
-    """With the exponent 8."""
-    return 0.00125 * (hoop**8 + axial**8 + (hoop * axial) ** -8 - 3)
-
-
-def gent(hoop, axial):
-    """With the limit 8 of I1 - 3."""
-    return -0.16 * np.log(1 - (first_invariant(hoop, axial) - 3) / 8)
-
-
-def demiray(hoop, axial):
-    """W = a/(2 b) (exp(b (I1 - 3)) - 1), b = 2."""
-    return 0.005 * (np.exp(2 * (first_invariant(hoop, axial) - 3)) - 1)
-
-
-def fung(hoop, axial):
-    """W = c/2 (exp(6 E1^2 + 3 E2^2 + 2 E1 E2) - 1) of Green's strains: another law along the axis than around it."""
-    around, along = (hoop**2 - 1) / 2, (axial**2 - 1) / 2
-    return 0.01 * (np.exp(6 * around**2 + 3 * along**2 + 2 * around * along) - 1)
-
-
-def fibres(hoop, axial):
-    """Two families at 45 degrees in a neo-Hookean matrix (Holzapfel, Gasser & Ogden 2000), k2 = 1."""
-    square = (hoop**2 + axial**2) / 2
-    return neo_hookean(hoop, axial) + 0.01 * (np.exp((square - 1) ** 2) - 1)
-
+from tissuq.experiments.reading.tube import Tube
 
 ISOTROPIC = (neo_hookean, mooney_rivlin, yeoh, ogden, gent, demiray)
-LAWS = (*ISOTROPIC, fung, fibres)
-
-
-def slope(law, hoop, axial):
-    """Return dW/dl of the hoop, by a complex step."""
-    return law(hoop + 1e-30j, axial).imag / 1e-30
+ROWS = 31
 
 
 def pressure(law, hoop, axial, inner, outer):
@@ -87,12 +46,6 @@ def pressure(law, hoop, axial, inner, outer):
         return slope(law, stretch, axial) * radius / (axial * radius**2 * stretch)  # dr = a/r da, with da left out
 
     return quad(lambda radius: change(radius), inner, outer, epsabs=1e-14, epsrel=1e-11)[0]
-
-
-def wall(ratio):
-    """Return the radii of a wall so many times as thick as the radius of its middle, which is 1 mm."""
-    outer = (ratio + np.sqrt(ratio**2 + 4)) / 2
-    return 1 / outer, outer
 
 
 @cache
@@ -154,25 +107,25 @@ def test_the_pressure_of_a_neo_hookean_tube_is_that_of_the_textbook():
 @pytest.mark.parametrize("axial", [0.9, 1.2, 1.5])
 def test_the_stress_in_the_middle_of_the_wall_is_that_of_the_law(law, axial):
     """The errors of docs/measures.md, in shares of the largest stress."""
-    for ratio, bound in ((0.1, 0.0015), (0.2, 0.0045), (0.4, 0.0075), (0.5, 0.0055)):
+    for ratio, bound in ((0.1, 0.0003), (0.2, 0.001), (0.4, 0.0035), (0.5, 0.005)):
         inner, outer = wall(ratio)
         tube, (stretch, pressures) = Tube(inner, outer), inflation(law, axial, inner, outer)
         stress = slope(law, stretch, axial)
-        found = tube.engineering_stress(stretch, pressures / tube.log_ratio, np.full(ROWS, axial))
+        (found,) = tube.engineering_stresses(stretch, np.full(ROWS, axial), pressures[None] / tube.log_ratio)
         is_exact = law in (neo_hookean, mooney_rivlin)
         np.testing.assert_allclose(found, stress, rtol=0, atol=(1e-8 if is_exact else bound) * stress.max())
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_noise_of_the_pressure_is_not_made_much_larger(law):
-    """The largest error of 20 curves with noise of half a percent stays below 5 % of the largest stress."""
+    """The largest error of 20 curves with noise of half a percent stays below 2.5 % of the largest stress."""
     inner, outer = wall(0.4)
     tube, (stretch, pressures), random = Tube(inner, outer), inflation(law, 1.4, inner, outer), np.random.default_rng(1)
     stress, mean = slope(law, stretch, 1.4), pressures / tube.log_ratio
     for _ in range(20):
         noisy = mean + 0.005 * mean.max() * random.standard_normal(ROWS)
-        found = tube.engineering_stress(stretch, noisy, np.full(ROWS, 1.4))
-        assert np.abs(found - stress).max() < 0.05 * stress.max()
+        (found,) = tube.engineering_stresses(stretch, np.full(ROWS, 1.4), noisy[None])
+        assert np.abs(found - stress).max() < 0.025 * stress.max()
 
 
 @pytest.mark.parametrize("law", LAWS)

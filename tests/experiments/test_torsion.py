@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_experiment
-from tissuq.experiments.reading.uneven_stress import apparent_stress, rim_stress
+from tissuq.experiments.reading.twisted_disc import apparent_stress, rim_stress
 from tissuq.experiments.units import TORQUE
 
 RADIUS, HEIGHT = 10.0, 2.0  # mm

@@ -14,6 +14,7 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.modes import loading_modes
 from tissuq.experiments.reading.inspection import Inspection, overview
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import stress_unit
 from tissuq.studies.answers import Answer, answers_in, with_options
 from tissuq.studies.files_of_tests import find_tests, tables_of, tests_in_words
@@ -119,9 +120,13 @@ def _test(settings: Mapping[str, Any], inspection: Inspection) -> dict[str, Any]
     experiment = reading.experiment
     roles: dict[str, str] = {}
     for number, choice in enumerate(reading.choices, start=1):
-        suffix = "2" if number > 1 else ""
-        roles[reading.table.key(choice.deformation)] = choice.measure + suffix
+        is_of_tube = choice.measure == ROLE_OF_AXIAL_STRETCH
+        suffix = "2" if number > 1 and not is_of_tube else ""
+        if not is_of_tube:
+            roles[reading.table.key(choice.deformation)] = choice.measure + suffix
         roles[reading.table.key(choice.stress)] = choice.load + suffix
+    if reading.axial_column is not None:
+        roles[reading.table.key(reading.axial_column)] = ROLE_OF_AXIAL_STRETCH
     return {
         "name": experiment.name,
         "file": str(settings["file"]),

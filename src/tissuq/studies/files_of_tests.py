@@ -90,7 +90,7 @@ def measured(
 
     if not files:
         return reading | {"noise_sd": noise[0] if noise else None}, []
-    held = _for_each([1] * len(files), "--axial-stretch", axial_stretches) or [None] * len(files)
+    held = _for_each([1] * len(files), "--axial-stretch", axial_stretches or [reading.get("axial_stretch")])
     of_files = [
         find_tests(file, reading | {"mode": mode, "axial_stretch": stretch}, is_only_file=len(files) == 1)
         for file, mode, stretch in zip(files, _modes(files, modes), held, strict=True)

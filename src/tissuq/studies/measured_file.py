@@ -39,7 +39,8 @@ class ReadingSettings(Settings):
     columns: dict[str, str | int] = reading(
         default_factory=dict,
         help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, or "
-        "pressure, outer_diameter (or inner_diameter) and axial_stretch of a tube, such as stretch=Strain; of the "
+        "pressure, outer_diameter (or inner_diameter), axial_stretch and force (or total_force) of a tube, such as "
+        "stretch=Strain; of the "
         "spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
         name="column",
         parse=pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column),

@@ -3,8 +3,9 @@ import { button, byId, fill, make, options, repeatOf } from "./dom.js";
 import { curveOf } from "./curve.js";
 
 const DEFORMATIONS = ["stretch", "strain", "displacement", "length", "shear", "sliding", "twist", "outer_diameter", "inner_diameter"];
-const LOADS = ["stress", "force", "torque", "pressure"];
-const ROLES = [...DEFORMATIONS, ...LOADS, "sd", "sem", "n"];
+const LOADS = ["stress", "force", "total_force", "torque"];
+const RIVALS = [DEFORMATIONS, LOADS, ["stress", "torque", "pressure"]]; // a tube has a pressure and a force
+const ROLES = [...DEFORMATIONS, "axial_stretch", ...LOADS, "pressure", "sd", "sem", "n"];
 const STRESSES = ["kPa", "MPa", "Pa", "N/cm2", "mmHg", "psi"], FORCES = ["N", "mN", "uN", "kN", "g", "gf"], LENGTHS = ["mm", "um", "cm", "m"];
 const FIELDS = [
   ["What the columns hold", [
@@ -16,7 +17,7 @@ const FIELDS = [
     ["turn", "Change the sign of", ["load", "deformation", "both"]]]],
   ["The specimen, undeformed", [
     ["dimensions.length", "Length", "20 mm"], ["dimensions.area", "Cross-section", "10 mm2"], ["dimensions.width", "Width", "5 mm"],
-    ["dimensions.thickness", "Thickness", "2 mm"], ["dimensions.diameter", "Diameter", "8 mm"],
+    ["dimensions.thickness", "Thickness", "2 mm"], ["dimensions.diameter", "Diameter", "8 mm"], ["axial_stretch", "Axial stretch of a tube", "1.5"],
     ["incompressible", "Take its volume as constant", Boolean]]],
   ["Where it begins", [
     ["zero", "Displacement counts from", "first, or 35.2 mm"], ["load_zero", "Load counts from", "first, or 0.02 N"],
@@ -26,7 +27,7 @@ const FIELDS = [
     ["until_peak", "Leave out what follows the largest stress", Boolean], ["every", "Every ... row", "2"], ["leave_out", "Leave out lines", "31,45:50"],
     ["sheet", "Sheet", "2"], ["table", "Table", "1"], ["skip_rows", "Skip lines at the top", "3"], ["axis", "Axis", ["x", "y"]]]],
 ];
-const NUMBERS = new Set(["every", "table", "skip_rows"]);
+const NUMBERS = new Set(["every", "table", "skip_rows", "axial_stretch"]);
 const numberOf = text => (Number.isNaN(Number(text)) ? text : Number(text)); // what is no number is refused with a message
 
 const valueOf = (reading, name) => {
@@ -76,7 +77,7 @@ const columnsOf = (found, reading, change) => {
   const seen = found.tests[0]?.roles ?? Object.fromEntries(Object.entries(reading.columns ?? {}).map(([role, name]) => [String(name), role]));
   const roles = { ...seen };
   const choose = (name, role) => {
-    const kinds = [DEFORMATIONS, LOADS].find(group => group.includes(role)) ?? [role];
+    const kinds = [role, ...RIVALS.filter(group => group.includes(role)).flat()];
     for (const other of Object.keys(roles)) if (other !== name && kinds.includes(roles[other])) delete roles[other];
     if (role) roles[name] = role; else delete roles[name];
     const chosen = Object.fromEntries(Object.entries(roles).map(([column, of]) => [of, column]));

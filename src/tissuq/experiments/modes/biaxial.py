@@ -65,7 +65,8 @@ class Biaxial(LoadingMode):
 class ThinTube(Biaxial):
     """Extension and inflation of a thin tube that does not twist: hoop and axial stretch, as `Biaxial`.
 
-    `engineering_stresses` tells what a pressure and an axial force are in these stresses.
+    Files of pressure, diameter and axial force are read in it. `engineering_stresses` tells what a pressure and a force
+    are in these stresses where the wall is thin.
     """
 
     name = "thin-tube"
@@ -113,7 +114,7 @@ class InflatedTube(LoadingMode):
 
     That is dW/dl_hoop at the axial stretch, l_hoop times which is the hoop less the radial Cauchy stress. At an axial
     stretch l_axial it is zero where l_hoop = l_axial^-1/2 if the material is isotropic; at 1 the mode is `Planar`.
-    Files of pressure and diameter are read in it.
+    Files of pressure and diameter without an axial force are read in it.
     """
 
     name = "inflated-tube"

@@ -8,19 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import InflatedTube, LoadingMode
-from tissuq.experiments.reading.columns import find_column
+from tissuq.experiments.modes import InflatedTube, LoadingMode, ThinTube
+from tissuq.experiments.reading.column_units import factor_of
+from tissuq.experiments.reading.columns_of_tube import (
+    HOW_TO_READ_TUBE,
+    HOW_TO_SAY_AXIAL_STRETCH,
+    column_of_axial_stretch,
+    is_of_length,
+)
+from tissuq.experiments.reading.dimensions import Dimensions
 from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.reading.recognition import HOW_TO_READ_TUBE, PRESSURE, ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, TOTAL_FORCE, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.uneven_stress import SAME_STRETCH, Tube, rows_at_each_stretch
-from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, ROLE_OF_AXIAL_STRETCH
-from tissuq.experiments.units import strain_factor
+from tissuq.experiments.reading.tube import SAME_STRETCH, Tube, rows_at_each_stretch
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
+from tissuq.experiments.units import LENGTH, strain_factor
 
 __all__ = [
     "AxialStretch",
     "axial_stretch_of",
-    "column_of_axial_stretch",
     "note_of_stretched_tube",
     "note_of_tube",
     "stretches_held",
@@ -28,6 +34,10 @@ __all__ = [
 
 LARGEST = 4.0
 """Axial stretch beyond which a number is hardly one, but percent."""
+ROWS_AT_EACH = 3
+"""Rows at each axial stretch, on average at least, where it is held."""
+MOST_LISTED = 6
+"""Number of axial stretches that a text lists."""
 AT_ITS_LENGTH = (
     "the tube is taken as held at its undeformed length, and as free of stress without pressure; if it was stretched "
     "along its axis first, the parameters of a fit are not those of its wall: then give --mode "
@@ -35,39 +45,34 @@ AT_ITS_LENGTH = (
 )
 
 
+WHICH_FORCE = {
+    "": "Its axial stress is not read, so that a fit knows what the material does along the axis only as far as the "
+    "hoop stress shows it.",
+    "force": "The force is taken as the reduced one, what the machine pulls with in addition to the pressure on the "
+    "closed ends; if that is in it, give --column total_force=NAME.",
+    TOTAL_FORCE: "The force is taken as that of the whole wall, with the pressure on the closed ends in it; if the "
+    "machine pulls with it in addition to that, give --column force=NAME.",
+}
+"""What is to know of the axial force, by the role of its column, or without one."""
+
+
 @dataclass(frozen=True, eq=False)
 class AxialStretch:
-    """The axial stretch (n,) of every row, and where it comes from."""
+    """The axial stretch (n,) of every row, where it comes from, and whether from lengths."""
 
     values: Column
     source: str
-
-
-def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None:
-    """Return the column of the axial stretch, in its role or by its name; None where there is none.
-
-    Raises
-    ------
-    InputError
-        When several may be it.
-    """
-    wanted = (options.get("columns") or {}).get(ROLE_OF_AXIAL_STRETCH)
-    if wanted is not None:
-        return find_column(table, ROLE_OF_AXIAL_STRETCH, wanted)
-    columns = [column for column, quantity in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(quantity)]
-    if len(columns) > 1:
-        labels = " and ".join(map(table.label, columns))
-        raise InputError(
-            f"{table.file}: columns {labels} may each be the axial stretch of a tube. Say which it is: --column "
-            f"{ROLE_OF_AXIAL_STRETCH}=NAME."
-        )
-    return columns[0] if columns else None
+    is_of_length: bool = False
 
 
 def axial_stretch_of(
-    table: Table, mode: LoadingMode, choices: Sequence[ColumnChoice], options: ReadingOptions
+    table: Table,
+    mode: LoadingMode,
+    choices: Sequence[ColumnChoice],
+    dimensions: Dimensions,
+    options: ReadingOptions,
 ) -> AxialStretch | None:
-    """Return the axial stretch of every row in the mode of an inflated tube; None in other modes.
+    """Return the axial stretch of every row of a tube that is read in a mode with one; None in other modes.
 
     Raises
     ------
@@ -75,13 +80,16 @@ def axial_stretch_of(
         When nothing says it, when the file contradicts what is given, or in another mode when a tube was stretched.
     """
     given, is_tube = options.get("axial_stretch"), choices[0].load == PRESSURE
-    if isinstance(mode, InflatedTube):
-        return _required(table, given, options)
+    if isinstance(mode, InflatedTube | ThinTube) and (is_tube or not isinstance(mode, ThinTube)):
+        axial = _required(table, given, dimensions, options)
+        if len(choices) == 1:
+            _check_held(table, axial.values)
+        return axial
     if not is_tube:
         if given is not None or ROLE_OF_AXIAL_STRETCH in (options.get("columns") or {}):
             raise InputError(
                 f"{table.file}: an axial stretch is given, which is of a tube under pressure: give --mode "
-                "inflated-tube, or leave it out."
+                "inflated-tube (or thin-tube, where the axial force was measured, too), or leave it out."
             )
         return None
     column = column_of_axial_stretch(table, options)
@@ -95,30 +103,30 @@ def axial_stretch_of(
     return None
 
 
-def _required(table: Table, given: float | None, options: ReadingOptions) -> AxialStretch:
+def _required(table: Table, given: float | None, dimensions: Dimensions, options: ReadingOptions) -> AxialStretch:
     column = column_of_axial_stretch(table, options)
     if given is None and column is None:
-        raise InputError(
-            f"{table.file}: say at which axial stretch the tube was held, its length over that when it is neither "
-            "stretched nor inflated: --axial-stretch 1.5 (in Python axial_stretch=1.5), or --column "
-            f"{ROLE_OF_AXIAL_STRETCH}=NAME for a column of it."
-        )
+        raise InputError(f"{table.file}: say at which axial stretch the tube was held, {HOW_TO_SAY_AXIAL_STRETCH}")
     if given is not None and not 0 < given <= LARGEST:
         raise InputError(
             f"axial_stretch (--axial-stretch) must be a deformed over an undeformed length such as 1.5, not {given:g}."
         )
     if column is None:
         return AxialStretch(np.full(len(table.rows), float(given or 1.0)), f"axial stretch {given:g} (as given)")
-    values, label = _numbers(table, column), table.label(column)
+    label = table.label(column)
+    if is_of_length(table, column):
+        values, source = _from_length(table, column, dimensions, options)
+    else:
+        values, source = _numbers(table, column), f"axial stretch = column {label}"
     is_off = ~((values > 0) & (values <= LARGEST))
     if is_off.any():
         row = int(np.argmax(is_off))
         raise InputError(
             f"{table.place(column, row)}: {values[row]:g} is no axial stretch, a deformed over an undeformed length "
-            "such as 1.5. If the column is in percent, write % in its heading; or give the stretch as --axial-stretch."
+            "such as 1.5. If the column is in percent, write % in its heading; of lengths check the unit and --length."
         )
     if given is None:
-        return AxialStretch(values, f"axial stretch = column {label}")
+        return AxialStretch(values, source, is_of_length(table, column))
     row = int(np.argmax(np.abs(values - given)))
     if abs(values[row] - given) > SAME_STRETCH:
         raise InputError(
@@ -126,6 +134,35 @@ def _required(table: Table, given: float | None, options: ReadingOptions) -> Axi
             f"{given:g}. Leave that out, or the column out of the file."
         )
     return AxialStretch(np.full(len(values), float(given)), f"axial stretch {given:g} (as given)")
+
+
+def _from_length(table: Table, column: int, dimensions: Dimensions, options: ReadingOptions) -> tuple[Column, str]:
+    """Return the axial stretches that lengths of the tube are, and how they were obtained."""
+    if "length" not in dimensions.sizes and "length" not in dimensions.ambiguous:
+        raise InputError(
+            f"{table.place(column)} is the length of a tube, and its length when it is neither stretched nor inflated "
+            'is not known: give it as --length "8 mm" (in Python length="8 mm"), or the axial stretch as '
+            "--axial-stretch 1.5."
+        )
+    length = dimensions.length
+    factor, unit_source = factor_of(table, column, LENGTH, "displacement_unit", options)
+    (values,) = table.numbers([column])
+    source = f"column {table.label(column)} in {unit_source} / {length.value:g} mm (length {length.source})"
+    return values * factor / length.value, f"axial stretch = {source}"
+
+
+def _check_held(table: Table, axial_stretch: Column) -> None:
+    """Refuse an axial stretch that goes on during an inflation of which pressure and diameter are all that is known."""
+    at_each = [axial_stretch[rows] for rows in rows_at_each_stretch(axial_stretch)]
+    moved = next((held for held in at_each if np.ptp(held) > 2 * SAME_STRETCH), None)
+    if moved is None and len(at_each) > 1 and len(axial_stretch) < ROWS_AT_EACH * len(at_each):
+        moved = axial_stretch
+    if moved is not None:
+        raise InputError(
+            f"{table.file}: the axial stretch changes from {moved.min():.4g} to {moved.max():.4g} while the tube is "
+            "inflated. Without the axial force the stress in its wall follows only at an axial stretch that is held, "
+            "at one or at several in turn: leave rows out with --leave-out, or read the force, too (--mode thin-tube)."
+        )
 
 
 def _numbers(table: Table, column: int) -> Column:
@@ -145,13 +182,12 @@ def note_of_tube(tube: Tube, axial: AxialStretch | None) -> str:
     return f"{AT_ITS_LENGTH} {tube.note}".rstrip() if axial is None else tube.note
 
 
-def note_of_stretched_tube(axial_stretch: Column) -> str:
-    """Return what is taken of a tube that was stretched along its axis, and what its test leaves open."""
+def note_of_stretched_tube(axial_stretch: Column, load: str = "") -> str:
+    """Return what is taken of a tube that was stretched along its axis, and of its axial force, if that is read."""
+    what = WHICH_FORCE[load]
     return (
         f"the tube is taken as held at {stretches_held(axial_stretch)} times its undeformed length, and as free of "
-        "stress when it is neither stretched nor inflated, the state that --diameter and --thickness are of. Its axial "
-        "stress is not read, so that a fit knows what the material does along the axis only as far as the hoop stress "
-        "shows it."
+        f"stress when it is neither stretched nor inflated, the state that --diameter and --thickness are of. {what}"
     )
 
 
@@ -162,6 +198,11 @@ def stretches_held(axial_stretch: Column) -> str:
     --------
     >>> stretches_held(np.array([1.3, 1.3, 1.5, 1.502]))
     '1.3 and 1.501'
+    >>> stretches_held(np.linspace(1.1, 1.5, 50))
+    '1.1 to 1.5'
     """
-    *others, last = (f"{axial_stretch[rows].mean():.4g}" for rows in rows_at_each_stretch(axial_stretch))
+    at_each = [axial_stretch[rows] for rows in rows_at_each_stretch(axial_stretch)]
+    if len(at_each) > MOST_LISTED or any(np.ptp(held) > 2 * SAME_STRETCH for held in at_each):
+        return f"{axial_stretch.min():.4g} to {axial_stretch.max():.4g}"
+    *others, last = (f"{held.mean():.4g}" for held in at_each)
     return f"{', '.join(others)} and {last}" if others else last

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from difflib import get_close_matches
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import LoadingMode, ThinTube
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.column_checks import (
     SPREAD_ROLES,
@@ -18,7 +17,8 @@ from tissuq.experiments.reading.column_checks import (
     check_together,
     with_types,
 )
-from tissuq.experiments.reading.headings import AXES, COMPONENTS, contents_of, on_axis, plain
+from tissuq.experiments.reading.columns_of_tube import columns_of_tube, with_columns_of_tube
+from tissuq.experiments.reading.headings import AXES, COMPONENTS, contents_of, on_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -27,17 +27,16 @@ from tissuq.experiments.reading.recognition import (
     LOADS,
     ColumnChoice,
     Contents,
-    ambiguous,
     columns_there_are,
+    find_column,
     recognise,
     told_by_unit,
-    with_columns_of_tube,
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLE_OF_AXIAL_STRETCH, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
-__all__ = ["about_stress", "choose_columns", "find_column", "mapping_of_each_stress"]
+__all__ = ["about_stress", "choose_columns", "mapping_of_each_stress"]
 
 
 def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:
@@ -54,6 +53,8 @@ def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> 
         When a role or column does not exist, several columns fit, or none does.
     """
     count, axis = len(mode.stresses), options.get("axis")
+    if isinstance(mode, ThinTube) and (of_tube := columns_of_tube(table, mode, options)):
+        return of_tube
     mapping = {role: name for role, name in (options.get("columns") or {}).items() if role != ROLE_OF_AXIAL_STRETCH}
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
@@ -90,29 +91,6 @@ def about_stress(number: int, labels: Sequence[str], mode: LoadingMode) -> Itera
             f"{error} (This is about {labels[number]}: roles of its columns end in 2, as in "
             f"--column stress2=NAME.{sizes})"
         ) from error
-
-
-def find_column(table: Table, role: str, wanted: str | int) -> int:
-    """Return the column (counted from 0) that is asked for in a role by its name, or its number from 1."""
-    text = str(wanted).strip()
-    readings = (
-        table.names,
-        [name.lower() for name in table.names],
-        table.quantities,
-    )
-    for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
-        columns = [column for column, name in enumerate(names) if name and name == key]
-        if len(columns) > 1:
-            raise ambiguous(table, [role], columns)
-        if columns:
-            return columns[0]
-    if text.isdecimal() and 1 <= int(text) <= len(table.names):
-        return int(text) - 1
-    close = get_close_matches(text.lower(), [name.lower() for name in table.names], n=1)
-    suggestion = next((f" Did you mean '{name}'?" for name in table.names if [name.lower()] == close), "")
-    raise InputError(
-        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {columns_there_are(table)}"
-    )
 
 
 def _with_numbered_second(table: Table) -> dict[str, str | int]:

@@ -15,16 +15,17 @@ from tissuq.experiments.reading.columns import about_stress, mapping_of_each_str
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions
 from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimensions_of_stresses, of_block
-from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
+from tissuq.experiments.reading.loads import Load, force_in, meant_for, stress_of, without_ends, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, TOTAL_FORCE, ColumnChoice
 from tissuq.experiments.reading.rows_of_tests import check_one_specimen, columns_only
 from tissuq.experiments.reading.side_by_side import test_beside
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import FORCE
 
 __all__ = ["as_columns", "measured_rows", "points_of", "stress_measure_of", "with_engineering_stress"]
@@ -53,23 +54,32 @@ def measured_rows(
         words = [Path(table.file).name, table.sheet, table.title, options.get("name") or ""]
         words += ["compression"] if options.get("compression_positive") else []
         dimensions = of_block(table, columns[0], (numbers[0][0], numbers[0][1]), dimensions, words)
-    axial = axial_stretch_of(table, mode, columns, options)
+    axial = axial_stretch_of(table, mode, columns, dimensions, options)
+    if axial is not None and axial.is_of_length:
+        dimensions = replace(dimensions, set_by_user=dimensions.set_by_user - {"length"})
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
+        is_of_tube, of_load = columns[0].load == PRESSURE, meant_for(choice, columns, options)
         is_force = choice.load == "force" and force_in(table, choice.stress, options) is FORCE
         size = replace(size, divide_forces=is_force, axial_stretch=1.0 if axial is None else axial.values)
-        with about_stress(number, labels, mode):
-            load, counted = without_zero(table, choice, load, options)
+        with about_stress(0 if is_of_tube else number, labels, mode):
+            load, counted = without_zero(table, choice, load, of_load)
             deformation, given_way = without_machine(table, choice, deformation, load, options)
-            stretch, step = stretch_of(table, choice, deformation, load, size, options)
-            stress = stress_of(table, choice, load, size, options)
+            if choice.measure == ROLE_OF_AXIAL_STRETCH and axial is not None:
+                stretch, step = axial.values, ""
+            else:
+                stretch, step = stretch_of(table, choice, deformation, load, size, options)
+            stress = stress_of(table, choice, load, size, of_load)
             spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
         stretches.append(stretch)
         stretch_steps.append(f"{step}{given_way}")
         note = note_of_tube(size.tube[0], axial) if choice.load == PRESSURE else stress.note
         loads.append(replace(stress, source=f"{stress.source}{counted}", note=note))
+    if columns[-1].load == TOTAL_FORCE and axial is not None:
+        tube, _ = sizes[-1].tube
+        loads[-1] = without_ends(loads[-1], tube.of_ends(stretches[0], axial.values, loads[0].stress))
     measured = MeasuredRows(
         table=table,
         rows=np.arange(len(table.rows)),
@@ -124,7 +134,8 @@ def stress_measure_of(table: Table, choices: Sequence[ColumnChoice]) -> StressMe
 def points_of(mode: LoadingMode, measured: MeasuredRows, stretch: Column | None = None) -> Column:
     """Return the points of a mode (n,) or (n, c): the stretches of rows, or others, and the axial stretch of a tube."""
     columns = (measured.stretch if stretch is None else stretch)[: len(mode.controls)]
-    return as_columns(columns if measured.axial_stretch is None else np.vstack([columns, measured.axial_stretch]))
+    axial = measured.axial_stretch
+    return as_columns(columns if axial is None or len(columns) == len(mode.controls) else np.vstack([columns, axial]))
 
 
 def as_columns(rows: Column) -> Column:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.stated_sizes import StatedSize
-from tissuq.experiments.reading.uneven_stress import Tube
+from tissuq.experiments.reading.tube import Tube
 from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
 __all__ = ["SECTIONS", "Dimension", "Dimensions", "agree", "in_words", "quantity_of", "sections_of"]

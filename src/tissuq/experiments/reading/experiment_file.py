@@ -17,8 +17,8 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import InflatedTube, Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.axial_stretch import column_of_axial_stretch
 from tissuq.experiments.reading.columns import choose_columns
+from tissuq.experiments.reading.columns_of_tube import column_of_axial_stretch
 from tissuq.experiments.reading.conversion import (
     as_columns,
     measured_rows,
@@ -60,6 +60,7 @@ from tissuq.experiments.reading.stated_mode import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 
 __all__ = ["Reading", "read", "read_experiment", "read_file", "read_rows", "table_of"]
 
@@ -139,11 +140,11 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         ``units`` of xarray.
     stretch, strain, displacement, shear, twist, rate, sliding, stress, torque, force : str or int, optional
         Entries of ``columns``: the name of a column, or its number from 1; those of a second axis end in 2.
-    pressure, outer_diameter, inner_diameter : str or int, optional
-        Likewise, of a tube.
+    pressure, outer_diameter, inner_diameter, total_force : str or int, optional
+        Likewise, of a tube; its axial force is ``force``, or ``total_force`` with that of the pressure on its ends.
     axial_stretch : float, optional
-        Of a tube in the mode ``inflated-tube``: the length at which it is held over the undeformed one. Without it the
-        file's column of that name, or the one in ``columns`` under ``axial_stretch``.
+        Of a tube that was stretched along its axis: the length at which it is held over the undeformed one. Without it
+        the file's column of that name, or the one in ``columns`` under ``axial_stretch``, also of lengths.
     length, area, width, thickness, diameter : str, optional
         Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
     unit : str, optional
@@ -306,7 +307,8 @@ def read_rows(
     choices = tuple(labelled_choices.values())
     if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
         check_not_sheared(table)
-    axial_column = column_of_axial_stretch(table, options) if isinstance(mode, InflatedTube) else None
+    has_axial_stretch = isinstance(mode, InflatedTube) or choices[-1].measure == ROLE_OF_AXIAL_STRETCH
+    axial_column = column_of_axial_stretch(table, options) if has_axial_stretch else None
     absent = set[int]()
     try:
         measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
@@ -342,9 +344,10 @@ def read_rows(
     if options.get("relaxed"):
         used = used.relaxed()
     check_stretches(used, choices)
-    stress_measure = loads[0].measure or stress_measure_of(table, choices)
+    stress_measure, doubt = loads[0].measure or stress_measure_of(table, choices), ""
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
+        doubt = stress_measure.doubt(points_of(mode, used, of_file), used.stress)
         recorded, used = (
             with_engineering_stress(mode, stress_measure, measured, points_of(mode, measured, stretch))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
@@ -370,7 +373,7 @@ def read_rows(
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
     problems = (spread.problem for spread in spreads if spread.problem)
     doubts = *assumptions(used, choices, options), *dimensions.averages, *dimensions.contradictions
-    about_loads = filter(None, (load.note for load in loads))
+    about_loads = filter(None, (doubt, *(load.note for load in loads)))
     notes = *table.notes, *problems, *about_loads
     return Reading(
         experiment,

@@ -306,7 +306,8 @@ def _diameter(reading: Reading, number: int) -> str:
 
 def _stretched_tube(reading: Reading, number: int) -> str:
     axial = reading.used.axial_stretch
-    return "" if axial is None else note_of_stretched_tube(axial)
+    load = reading.choices[-1].load if len(reading.choices) > 1 else ""
+    return "" if axial is None else note_of_stretched_tube(axial, load)
 
 
 def _many(reading: Reading, number: int) -> str:

@@ -11,12 +11,13 @@ import numpy as np
 from tissuq.experiments.numbers import wrapped
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.axial_stretch import stretches_held
+from tissuq.experiments.reading.columns_of_tube import is_of_length
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
-from tissuq.experiments.reading.vocabulary import SPREADS
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, SPREADS
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import merged
 
@@ -105,7 +106,8 @@ class Inspection:
         labels_of_spans, stretches, stresses = zip(*self._spans(), strict=True)
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
-        held = "" if used.axial_stretch is None else f" (hoop), axial stretch {stretches_held(used.axial_stretch)}"
+        axial, is_hoop_alone = used.axial_stretch, len(used.labels) == 1
+        held = "" if axial is None or not is_hoop_alone else f" (hoop), axial stretch {stretches_held(axial)}"
         yield "stretch", f"{'; '.join(labelled(labels_of_spans, stretches))}{held}{again}"
         yield "stress", f"{'; '.join(labelled(labels_of_spans, stresses))} (engineering stress, tension positive)"
         if used.standard_error.any():
@@ -134,12 +136,13 @@ class Inspection:
         for label, choice in zip(self.reading.used.labels, self.reading.choices, strict=True):
             suffix = f" of {label}" if label else ""
             measure = _typed(choice.stress_type) if choice.load == "stress" else ""
-            roles[choice.stress] = f"{measure}{choice.load}{suffix}"
-            roles[choice.deformation] = (
-                _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
-            )
-        if self.reading.axial_column is not None:
-            roles[self.reading.axial_column] = "axial stretch"
+            roles[choice.stress] = f"{measure}{choice.load.replace('_', ' ')}{suffix}"
+            if choice.measure != ROLE_OF_AXIAL_STRETCH:
+                roles[choice.deformation] = (
+                    _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
+                )
+        if (column := self.reading.axial_column) is not None:
+            roles[column] = "length of the tube" if is_of_length(table, column) else "axial stretch"
         for column in range(len(table.names)):
             if self.reading.mode_source == f"column {table.label(column)}":
                 roles[column] = "loading mode"

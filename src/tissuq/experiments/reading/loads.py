@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +15,10 @@ from tissuq.experiments.reading.dimensions import Dimensions, in_words
 from tissuq.experiments.reading.measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import FIRST_ROW
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import TOTAL_FORCE, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.uneven_stress import apparent_stress
+from tissuq.experiments.reading.twisted_disc import apparent_stress
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
 
 __all__ = ["Load", "force_in", "stress_of", "without_zero"]
@@ -98,6 +100,12 @@ def stress_of(
         source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
         scale = factor / tube.log_ratio
         return Load(values * scale, _unit_shown(options), source, scale=scale, measure=measure_of_tube(tube))
+    if choice.measure == ROLE_OF_AXIAL_STRETCH:
+        factor, unit_source = factor_of(table, choice.stress, FORCE, "force_unit", options)
+        tube, _ = dimensions.tube
+        source = f"mean stress of the wall f / (pi (B^2 - A^2)): f = column {label} in {unit_source}"
+        scale = factor / tube.section
+        return Load(values * scale, _unit_shown(options), source, divided=FORCE, by=tube.section, scale=scale)
     if choice.load == "force":
         if choice.stress_type != "engineering":
             raise InputError(
@@ -134,6 +142,34 @@ def force_in(table: Table, column: int, options: ReadingOptions) -> Quantity:
     return FORCE_PER_WIDTH if is_per_width else FORCE
 
 
+def meant_for(choice: ColumnChoice, choices: Sequence[ColumnChoice], options: ReadingOptions) -> ReadingOptions:
+    """Return the options without the unit and the zero of a load that are meant for the other one of a tube.
+
+    Raises
+    ------
+    InputError
+        When nothing tells for which of both the zero is.
+    """
+    if len(choices) < 2 or choices[0].load != PRESSURE.name:
+        return options
+    own, zero = options.copy(), options.get("load_zero")
+    if zero == FIRST_ROW:
+        raise InputError(
+            "load_zero='first' (--load-zero first) does not say whether it is of the pressure or of the axial force: "
+            "give it as a number with its unit, such as --load-zero '0.02 N'."
+        )
+    of_pressure = choice.load == PRESSURE.name
+    for option, unit in (("force_unit", options.get("force_unit")), ("load_zero", number_and_unit(str(zero))[1])):
+        if unit and (PRESSURE.factor_or_none(unit) is not None) is not of_pressure:
+            own |= {option: None}  # type: ignore[misc]  # the name of one of its options
+    return own
+
+
+def without_ends(load: Load, of_ends: Column) -> Load:
+    """Return the stress of a reduced force for that of the whole one, less the force of pressure on the closed ends."""
+    return replace(load, stress=load.stress - of_ends, source=f"{load.source}, less the pressure on the ends pi a^2 p")
+
+
 def without_zero(table: Table, choice: ColumnChoice, values: Column, options: ReadingOptions) -> tuple[Column, str]:
     """Return the loads of a column, in its unit, less what the load cell reads without load, and words that say so.
 
@@ -149,6 +185,7 @@ def without_zero(table: Table, choice: ColumnChoice, values: Column, options: Re
         return values - values[0], f", counted from {values[0]:g} (its first row)"
     number, unit = number_and_unit(str(load_zero))
     quantities = {"force": force_in(table, choice.stress, options), "torque": TORQUE, "pressure": PRESSURE}
+    quantities |= {TOTAL_FORCE: FORCE}
     quantity = quantities.get(choice.load)
     example = f"0.05 {quantity.unit if quantity else 'kPa'}"
     if number is None or not unit or measured_in(unit) not in (choice.load, "stress", "pressure", "force per width"):

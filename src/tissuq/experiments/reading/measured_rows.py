@@ -16,7 +16,7 @@ from tissuq.experiments.branches import REVERSAL, turning_points
 from tissuq.experiments.reading.disturbances import ends_of_rests
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
-from tissuq.experiments.reading.uneven_stress import rows_at_each_stretch
+from tissuq.experiments.reading.tube import SAME_STRETCH, rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
@@ -94,8 +94,9 @@ class MeasuredRows:
 
     @property
     def is_at_several_lengths(self) -> bool:
-        """Whether a tube was inflated at several axial stretches in turn, so that its cycles are no repetitions."""
-        return self.axial_stretch is not None and len(rows_at_each_stretch(self.axial_stretch)) > 1
+        """Whether a tube was at several axial stretches, in turn or one after the other: its cycles repeat nothing."""
+        axial = self.axial_stretch
+        return axial is not None and (len(rows_at_each_stretch(axial)) > 1 or float(np.ptp(axial)) > 2 * SAME_STRETCH)
 
     @property
     def course(self) -> Column:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.uneven_stress import Tube, rim_stress
+from tissuq.experiments.reading.tube import Tube
+from tissuq.experiments.reading.twisted_disc import rim_stress
 
 __all__ = ["STRAIN_MEASURES", "STRESS_MEASURES", "StrainMeasure", "StressMeasure", "measure_of_tube"]
 
@@ -165,6 +166,8 @@ class StressMeasure:
         How, in words.
     is_of_file : bool
         Whether stretches count from where they do in the file, and not from where a preload makes the specimen taut.
+    doubt : callable, optional
+        What is doubtful about such stresses (k, n) at points of the mode, in words; an empty text where nothing is.
     """
 
     name: str
@@ -172,6 +175,7 @@ class StressMeasure:
     engineering: Callable[[LoadingMode, FloatArray, FloatArray], FloatArray] | None = None
     step: str = ""
     is_of_file: bool = False
+    doubt: Callable[[FloatArray, FloatArray], str] = lambda points, stress: ""
 
 
 def _from_cauchy(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> FloatArray:
@@ -218,20 +222,18 @@ STRESS_MEASURES = {
 volume), and 2 T / (pi R^3) of the torque T of a disc with the radius R."""
 
 
-def _from_mean_in_wall(tube: Tube, points: FloatArray, mean: FloatArray) -> FloatArray:
-    if points.ndim == 1:
-        return tube.engineering_stress(points, mean)
-    hoop, axial = np.moveaxis(points, -1, 0)
-    return tube.engineering_stress(hoop, mean, axial)
+def _hoop_and_axial(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    hoop, axial = (points, np.ones(len(points))) if points.ndim == 1 else np.moveaxis(points, -1, 0)
+    return hoop, axial
 
 
 def measure_of_tube(tube: Tube) -> StressMeasure:
-    """Return the measure of mean stresses p / ln(B/A) of a tube's wall."""
+    """Return the measure of loads of a tube's wall: p / ln(B/A), and the force over the cross-section if it is read."""
     return StressMeasure(
         name="inflation",
         words="",
-        engineering=lambda mode, points, stress: _from_mean_in_wall(tube, points, stress[0])[None],
-        step="mean stress of the wall times the hoop stretch (and the axial stretch, where that is not 1), and times "
-        "the stress in its middle over the mean, to engineering stress",
+        engineering=lambda mode, points, loads: tube.engineering_stresses(*_hoop_and_axial(points), loads),
+        step="from mean stresses of the wall to engineering stress in its middle, by a mixture of laws that bears them",
         is_of_file=True,
+        doubt=lambda points, loads: tube.doubt(*_hoop_and_axial(points), loads),
     )

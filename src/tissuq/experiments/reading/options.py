@@ -82,6 +82,7 @@ class PythonOptions(ReadingOptions, total=False):
     pressure: str | int | None
     outer_diameter: str | int | None
     inner_diameter: str | int | None
+    total_force: str | int | None
     stretch2: str | int | None
     strain2: str | int | None
     displacement2: str | int | None

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import InflatedTube, LoadingMode, Planar
-from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, plain
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES, ROLES_OF_TUBE, other_quantity
@@ -18,25 +18,25 @@ __all__ = [
     "DEFORMATIONS",
     "DEFORMATIONS_OF_UNITS",
     "DIAMETERS",
-    "HOW_TO_READ_TUBE",
     "LENGTHENINGS",
     "LOADS",
     "OTHER_MEASURE",
     "PRESSURE",
     "SHEARS",
+    "TOTAL_FORCE",
     "ColumnChoice",
     "Contents",
     "ambiguous",
     "columns_there_are",
+    "find_column",
     "recognise",
     "say_which",
     "told_by_unit",
-    "with_columns_of_tube",
 ]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
-*DIAMETERS, PRESSURE = ROLES_OF_TUBE
+*DIAMETERS, PRESSURE, TOTAL_FORCE = ROLES_OF_TUBE
 DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
 LOADS = ("stress", "torque", "force", PRESSURE)
 DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist", "pixels": "length"}
@@ -54,14 +54,6 @@ NEITHER_LOAD_NOR_DEFORMATION = re.compile(
     + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
-
-HOW_TO_READ_TUBE = (
-    'If it was held at its undeformed length, give --mode planar --diameter "3 mm" --thickness "0.5 mm": its '
-    "undeformed outer diameter and the thickness of its wall. If it was stretched along its axis first, give these and "
-    "--mode inflated-tube --axial-stretch 1.5, where the file has no column of it. Where the axial force was measured, "
-    "too, ThinTube.engineering_stresses in Python makes both stresses of --mode thin-tube."
-)
-"""How a tube is read."""
 
 
 @dataclass(frozen=True)
@@ -235,6 +227,29 @@ def _deformation_hint(table: Table, contents: Contents, roles: Sequence[str]) ->
     return f" Column {table.label(columns[0])} is an amount of shear; if it is simple shear, give --mode simple-shear."
 
 
+def find_column(table: Table, role: str, wanted: str | int) -> int:
+    """Return the column (counted from 0) that is asked for in a role by its name, or its number from 1."""
+    text = str(wanted).strip()
+    readings = (
+        table.names,
+        [name.lower() for name in table.names],
+        table.quantities,
+    )
+    for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
+        columns = [column for column, name in enumerate(names) if name and name == key]
+        if len(columns) > 1:
+            raise ambiguous(table, [role], columns)
+        if columns:
+            return columns[0]
+    if text.isdecimal() and 1 <= int(text) <= len(table.names):
+        return int(text) - 1
+    close = get_close_matches(text.lower(), [name.lower() for name in table.names], n=1)
+    suggestion = next((f" Did you mean '{name}'?" for name in table.names if [name.lower()] == close), "")
+    raise InputError(
+        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {columns_there_are(table)}"
+    )
+
+
 def ambiguous(table: Table, roles: Sequence[str], columns: Sequence[int]) -> InputError:
     """Return that several columns may have a role, and how to say which has it."""
     fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in columns)
@@ -258,62 +273,3 @@ def _how_to_say(table: Table, roles: Sequence[str]) -> str:
         )
     more = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
     return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{more}.'
-
-
-def with_columns_of_tube(
-    table: Table, mode: LoadingMode, mapping: Mapping[str, str | int], quantities: Sequence[str]
-) -> dict[str, str | int]:
-    """Return the roles of columns with those of a tube, its pressure and a diameter, where the table is of one.
-
-    Parameters
-    ----------
-    table : Table
-    mode : LoadingMode
-    mapping : mapping
-        The roles that are given.
-    quantities : sequence of str
-        What the columns' names say they hold.
-
-    Raises
-    ------
-    InputError
-        When one of both columns is missing, or the loading mode is none of a tube.
-    """
-    tube_roles, other_roles = (
-        [role for role in mapping if (role in ROLES_OF_TUBE) is is_given] for is_given in (True, False)
-    )
-    if not tube_roles and (other_roles or len(mode.stresses) > 1):
-        return dict(mapping)
-    by_role = {role: columns for role in ROLES_OF_TUBE if (columns := list(_columns_of_tube(table, quantities, role)))}
-    has_both = PRESSURE in by_role and not by_role.keys().isdisjoint(DIAMETERS)
-    if not tube_roles and (not has_both or not ROLES["stress"].isdisjoint(quantities)):
-        return dict(mapping)
-    if other_roles:
-        raise InputError(
-            f"{table.file}: columns are given as {tube_roles[0]} and as {other_roles[0]}, which do not go together: of "
-            "a tube give a pressure and a diameter (--column pressure=NAME --column outer_diameter=NAME)."
-        )
-    diameter = next((role for roles in (mapping, by_role) for role in DIAMETERS if role in roles), DIAMETERS[0])
-    for role in (PRESSURE, diameter):
-        columns = by_role.get(role, [])
-        if role not in mapping and len(columns) != 1:
-            labels = " and ".join(map(table.label, columns))
-            fault = f"columns {labels} may each be" if labels else "no column is recognised as"
-            raise InputError(
-                f"{table.file}: {fault} the {role.replace('_', ' ')} of a tube. Say which it is: --column {role}=NAME."
-            )
-    if not isinstance(mode, Planar | InflatedTube):
-        names = " and ".join(table.label(by_role[role][0]) for role in (PRESSURE, diameter) if role in by_role)
-        advice = "" if tube_roles else " To read other columns, say which: --column stretch=NAME --column force=NAME."
-        raise InputError(f"{table.file} is of a tube under pressure ({names}). {HOW_TO_READ_TUBE}{advice}")
-    return {role: mapping.get(role, by_role.get(role, [0])[0] + 1) for role in (PRESSURE, diameter)}
-
-
-def _columns_of_tube(table: Table, quantities: Sequence[str], role: str) -> Iterator[int]:
-    """Yield the columns that change and whose names have a role, or whose unit is one of pressures alone."""
-    names = ROLES[role]
-    is_named = any(quantity in names for quantity in quantities)
-    for column, quantity in enumerate(quantities):
-        is_one = quantity in names if is_named or role != PRESSURE else measured_in(table.unit(column)) == PRESSURE
-        if is_one and not table.is_constant(column):
-            yield column

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.numbers import NUMBER
-from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, is_of_specimens, plain
-from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice, find_column
 from tissuq.experiments.reading.stated_mode import modes_in_column
 from tissuq.experiments.reading.table import Column, Table, filled_on
+from tissuq.experiments.reading.tube import SAME_STRETCH
 from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, CYCLE_NAMES, SET_NAMES
 
 __all__ = [
@@ -163,8 +163,11 @@ def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], cour
 def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
     """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
-    if choices[0].load == PRESSURE:  # a tube is inflated at several axial stretches in turn
-        used |= {column for column, name in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(name)}
+    is_tube, axial = choices[0].load == PRESSURE, choices[-1].deformation
+    if is_tube:  # it is inflated at several axial stretches in turn, or stretched at several pressures
+        stretches = [column for column, name in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(name)]
+        axial = stretches[0] if len(choices) == 1 and stretches else axial
+        used |= {*stretches, *(column for column in range(len(table.names)) if table.unit(column))}
     samples = list(zip(*table.some_rows(SAMPLED_ROWS).cells(), strict=True))
     for column in sorted(set(range(len(table.names))) - used):
         quantity = table.quantities[column]
@@ -177,10 +180,19 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
         distinct = list(dict.fromkeys(labels))
         if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
             continue
+        if is_tube and not is_of_specimens(quantity) and _are_at_other_stretches(table, axial, labels):
+            continue
         are_cycles = all(plain(label).rstrip("0123456789 .#") in CYCLE_NAMES for label in distinct)
         is_of_tests = _goes_again(labels, distinct, course) and not are_cycles
         if is_of_specimens(quantity) or is_of_tests or len(modes_in_column(table, column)) > 1:
             yield column, labels
+
+
+def _are_at_other_stretches(table: Table, axial: int, labels: Sequence[str]) -> bool:
+    """Tell whether rows of different labels are of a tube at different axial stretches, or lengths: of its protocol."""
+    (values,), are = table.numbers([axial]), np.array(labels)
+    ranges = [(values[are == label].min(), values[are == label].max()) for label in dict.fromkeys(labels)]
+    return not any(np.allclose(one, other, rtol=SAME_STRETCH, atol=0) for one, other in combinations(ranges, 2))
 
 
 def _goes_again(labels: Sequence[str], distinct: Sequence[str], course: Column) -> bool:

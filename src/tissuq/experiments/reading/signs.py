@@ -101,12 +101,13 @@ def _turned(measured: MeasuredRows, choices: Sequence[ColumnChoice], what: Seque
             f"{measured.table.place(unfit.deformation)} is read as {unfit.measure.replace('_', ' ')}, which has no "
             "other sign: turn the load alone (--turn load), or leave turn (--turn) out."
         )
-    names = {"deformation": choices[0].measure, "load": choices[0].load}
+    names = {"deformation": choices[0].measure, "load": choices[-1].load.replace("_", " ")}
     if "deformation" in what:
         turned = map(_of_other_sign, measured.stretch, choices)
         measured = replace(measured, stretch=np.stack(list(turned)))
     if "load" in what:
-        measured = replace(measured, stress=-measured.stress)
+        is_turned = [len(choices) == 1 or choice.load != "pressure" for choice in choices]
+        measured = replace(measured, stress=np.where(np.array(is_turned)[:, None], -measured.stress, measured.stress))
     signs = "signs" if len(what) > 1 else "sign"
     return measured.with_step(f"{signs} of {' and '.join(names[name] for name in what)} changed: {why}")
 

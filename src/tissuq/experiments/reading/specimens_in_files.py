@@ -12,11 +12,11 @@ from typing import Unpack
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.experiment_file import Reading, table_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format
 from tissuq.experiments.reading.layout import WHITESPACE, is_comment, split
 from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import only_rows, row_names
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file

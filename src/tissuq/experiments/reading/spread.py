@@ -9,12 +9,11 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.headings import is_of_mean, of_spread, without_mean
 from tissuq.experiments.reading.loads import Load
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice, find_column
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.vocabulary import COUNT_NAMES, ROLES, SPREADS
+from tissuq.experiments.reading.vocabulary import COUNT_NAMES, ROLE_OF_AXIAL_STRETCH, ROLES, SPREADS
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
 __all__ = ["Spread", "spread_of"]
@@ -68,8 +67,9 @@ def spread_of(
         When a column that is given cannot be used.
     """
     wanted = next((kind for kind in SPREADS if kind in mapping), None)
-    if choice.stress_type == "torsion" or choice.load == "pressure":
-        of_load = "the pressure in a tube" if choice.load == "pressure" else "the torque of a disc"
+    is_of_tube = choice.load == PRESSURE or choice.measure == ROLE_OF_AXIAL_STRETCH
+    if choice.stress_type == "torsion" or is_of_tube:
+        of_load = f"the {choice.load.replace('_', ' ')} in a tube" if is_of_tube else "the torque of a disc"
         if wanted or mean_of is not None:
             option = f"--column {wanted}={mapping[wanted]}" if wanted else f"mean_of={mean_of} (--mean-of)"
             raise InputError(f"{table.file}: {option} is for stresses or forces, not for {of_load}. Leave it out.")

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
+from tissuq.experiments.reading.columns_of_tube import mode_of_tube
 from tissuq.experiments.reading.headings import NEXT_WORD, STRESS_NOUNS, heading, measure_in, on_lettered_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, ROLE_OF_AXIAL_STRETCH, ROLES
+from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, ROLES
 
 __all__ = [
     "DEFAULT_MODE",
@@ -115,16 +116,20 @@ def mode_of(
     """
     if (wanted := options.get("mode")) is not None:
         return wanted, GIVEN
-    mode, source = "", ""
+    mode, source, is_by_word = "", "", False
     for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
         if len(modes := modes_in_column(table, column)) == 1:
             mode, source = modes.pop(), f"column {table.label(column)}"
             break
     if not mode:
         mode, source = find_mode(file, [table.sheet, table.title, *words])
+        is_by_word = mode == DEFAULT_MODE and not mode_in_comment(Path(file))  # which a tube may be called, too: axial
     columns = options.get("columns") or {}
     if not mode and columns.keys() & {*SHEARS, "torque"}:
         mode, source = "simple-shear", "a column of shear"
+    if (is_by_word or not mode) and not options.get("axis"):
+        of_tube = mode_of_tube(table, options)
+        mode, source = of_tube if of_tube[0] else (mode, source)
     if not mode and (options.get("axial_stretch") is not None or ROLE_OF_AXIAL_STRETCH in columns):
         mode, source = "inflated-tube", "an axial stretch"
     if not (mode or columns or options.get("axis")):
@@ -188,9 +193,6 @@ def _mode_of_columns(table: Table) -> tuple[str, str]:
     loads = ROLES["stress"] | STRESS_NOUNS | ROLES["force"]
     if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
         return "biaxial", "columns of both axes"
-    tube = [{*quantities} & ROLES[role] for role in ("pressure", "outer_diameter", "inner_diameter")]
-    if tube[0] and any(tube[1:]) and any(map(AXIAL_STRETCH.fullmatch, quantities)) and not {*quantities} & loads:
-        return "inflated-tube", "columns of pressure, diameter and axial stretch"
     stretches, shears, twists = (
         names & set(quantities) for names in (deformations, ROLES["shear"] | ROLES["sliding"], ROLES["twist"])
     )

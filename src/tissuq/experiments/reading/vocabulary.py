@@ -14,6 +14,7 @@ __all__ = [
     "DEFORMATION_NOUNS",
     "DIMENSION_NAMES",
     "HEIGHT_NAMES",
+    "LENGTH_OF_TUBE",
     "MEAN_WORDS",
     "NOUNS",
     "OF_SPECIMEN",
@@ -150,10 +151,15 @@ ROLES = {
         "horizontal force, force per width, force per unit width, line load, membrane force, "
         "kraft pro breite, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, "
         "forza di taglio, effort, charge, fuerza, carga, força, forza, carico, kracht, belasting, "
+        "reduced force, reduced axial force, transducer force, axial transducer force, "
         "力, 载荷, 荷重, 试验力, 試験力, 하중, 负荷, 負荷, 負載, 负载, 拉力, 拉伸力, 力值, "
         "сила, усилие, нагрузка, осевая сила, осевое усилие, осевая нагрузка, растягивающая сила, сжимающая сила, "
         "растягивающее усилие, сжимающее усилие, нормальная сила, сила сдвига, сдвиговая сила, поперечная сила, "
         "剪切力, せん断力"
+    ),
+    "total_force": names_of(
+        "total force, total axial force, axial total force, wall force, axial wall force, gesamtkraft, force totale, "
+        "fuerza total, forza totale, força total, 总力, 总轴向力, полная сила, полная осевая сила"
     ),
     "torque": names_of(
         "torque, axial torque, drehmoment, moment, torsionsmoment, couple, couple de torsion, par, par de torsión, "
@@ -192,11 +198,11 @@ ROLES = {
 """Names of columns by their role, as :func:`plain` writes them, without the words for a measure of strain or stress."""
 
 
-ROLES_OF_TUBE = ("outer_diameter", "inner_diameter", "pressure")
+ROLES_OF_TUBE = ("outer_diameter", "inner_diameter", "pressure", "total_force")
 
 
 ROLE_OF_AXIAL_STRETCH = "axial_stretch"
-"""Of a column beside these."""
+"""Of a column beside these, which may also hold the length of the tube."""
 
 
 AXIAL_STRETCH = re.compile(
@@ -205,6 +211,14 @@ AXIAL_STRETCH = re.compile(
     r"轴向拉伸比?|осевая степень растяжения"
 )
 """Names of a column that is one where there are columns of a tube, too."""
+
+
+LENGTH_OF_TUBE = re.compile(
+    r"((axial|longitudinal|vessel|artery|tube|segment|specimen|sample|current|deformed|loaded|stretched) )?length|"
+    r"gefäßlänge|(axiale |aktuelle )?länge|longueur( axiale)?|longitud( axial)?|lunghezza( assiale)?|"
+    r"(轴向)?长度|(осевая )?длина"
+)
+"""Likewise, of a column of its length."""
 
 
 NOUNS = {
