@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import tissuq as tq
+from thick_tubes import fibres, rows_of, written
 from tissuq.cli.app import app
 from tissuq.errors import InputError
 from tissuq.studies.answers import answers_in, options_in
@@ -107,6 +108,17 @@ def test_input_that_ends_or_is_wrong_says_so_and_writes_nothing(negative):
     assert "--length needs a value" in text
     assert "the input ended at a question" in str(said.exception)
     assert not (negative.parent / "study.toml").exists()
+
+
+def test_an_axial_stretch_is_typed(here):
+    rows = rows_of(fibres, held=(1.4,), at_rest=None)[:, [0, 1, 3]]
+    written(here, rows, "Pressure (mmHg),Outer diameter (um),Axial force (mN)")
+    sizes = ("--diameter", "3 mm", "--thickness", "0.25 mm")
+    said, text = answered("1", "long", "1", "1.4", arguments=("artery.csv", *sizes))
+    assert said.exit_code == 0, said.output
+    assert "1 --axial-stretch: a number to type" in text
+    assert "needs a number such as 1.5, not 'long'" in text
+    assert set(fitted_data().stretch[:, 1]) == {1.4}
 
 
 def test_answers_are_the_options_of_a_message():

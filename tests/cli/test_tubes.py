@@ -6,6 +6,8 @@ import pytest
 
 from thick_tubes import fibres, rows_of, written, yeoh
 from tissuq.app.account import account
+from tissuq.errors import InputError
+from tissuq.studies.answers import Answer, with_options
 from tissuq.studies.files_of_tests import measured
 
 SIZES = ["--diameter", "3 mm", "--thickness", "0.25 mm"]
@@ -53,6 +55,20 @@ def test_an_axial_stretch_among_the_options_of_reading_holds_for_every_file(here
     sizes = {"diameter": "3 mm", "thickness": "0.25 mm"}
     _, (reading,) = measured([file], {"axial_stretch": 1.4, "dimensions": sizes}, None, None, None)
     assert set(reading.experiment.stretch[:, 1]) == {1.4}
+
+
+def test_the_axial_stretch_that_is_missing_is_asked_for(here):
+    """It is typed: the example in the message is no answer."""
+    rows = rows_of(fibres, held=(1.4,), at_rest=None)[:, [0, 1, 3]]
+    written(here, rows, "Pressure (mmHg),Outer diameter (um),Axial force (mN)")
+    settings = {"dimensions": {"diameter": "3 mm", "thickness": "0.25 mm"}}
+    answers = account(["artery.csv"], settings, [None])["error"]["answers"]
+    assert "axial-stretch" in [name for answer in answers for name in answer["asked_for"]]
+    assert all(answer["asked_for"] for answer in answers if "axial_stretch" in answer["settings"])
+    typed = with_options(settings, Answer((("axial-stretch", "1.4"),)))
+    assert account(["artery.csv"], typed, [None])["tests"][0]["mode"] == "thin-tube"
+    with pytest.raises(InputError, match=r"--axial-stretch needs a number such as 1\.5, not 'x'"):
+        with_options(settings, Answer((("axial-stretch", "x"),)))
 
 
 def test_the_page_shows_both_stresses_and_the_role_of_every_column(here):

@@ -11,7 +11,7 @@ from tissuq.cli.command import command
 from tissuq.cli.running import IntoFolder
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.numbers import wrapped
-from tissuq.studies.answers import Answer, answers_in, options_in, with_options
+from tissuq.studies.answers import DIMENSIONS, Answer, answers_in, options_in, with_options
 from tissuq.studies.files_of_tests import files_of, find_tests, tables_of, tests_in_words
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import argument, option
@@ -170,7 +170,8 @@ def _what_it_gives(
 ) -> str:
     """Return in words what an answer would give; nothing where the same would be asked again."""
     if answer.asked_for:
-        return "a size, to type with its unit"
+        is_size = set(answer.asked_for) <= set(DIMENSIONS)
+        return "a size, to type with its unit" if is_size else "a number to type"
     try:
         return tests_in_words(find_tests(file, with_options(settings, answer), is_only_file=is_only_file))
     except TissuqError as refusal:
@@ -181,14 +182,18 @@ def _what_it_gives(
 
 
 def _with_sizes(answer: Answer) -> Answer:
-    """Return an answer with the sizes that a person types."""
-    options = [(name, _typed_size(name) if name in answer.asked_for else value) for name, value in answer.options]
+    """Return an answer with the sizes and numbers that a person types."""
+    options = [
+        (name, _typed_value(name, value) if name in answer.asked_for else value) for name, value in answer.options
+    ]
     return Answer(tuple(options), answer.leaves_out)
 
 
-def _typed_size(name: str) -> str:
+def _typed_value(name: str, example: str) -> str:
     from tissuq.experiments.reading.dimensions_of_table import given_size
 
+    if name not in DIMENSIONS:
+        return _typed(f"{name}, such as {example}: ")
     while True:
         typed = _typed(f"{name}, with its unit: ")
         try:

@@ -6,14 +6,16 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 from typing import Any
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import number_in
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of, stated
 from tissuq.studies.settings import imported
 
-__all__ = ["Answer", "answers_in", "options_in", "with_options"]
+__all__ = ["DIMENSIONS", "Answer", "answers_in", "options_in", "with_options"]
 
 SWITCHES = {"compression-positive": True, "tension-positive": False, "until-peak": True, "incompressible": True}
 """Options without a value, and what they say."""
@@ -22,6 +24,8 @@ READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSetti
 READING |= {slot.option.negative: slot for slot in READING.values() if slot.option.negative}
 DIMENSIONS = tuple(name for name, slot in READING.items() if slot.path[0] == "dimensions")
 """Options that are sizes."""
+TYPED = (*DIMENSIONS, "axial-stretch")
+"""Options whose values a person must type: of which messages show examples."""
 OPTION = re.compile(r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+)))?""")
 OTHER_ROLES = re.compile(r"\(or ((?:\w+=(?:, | or )?)+)\)")
 """As in ``--column stress=NAME (or force=)``."""
@@ -48,15 +52,15 @@ class Answer:
 
     @property
     def asked_for(self) -> tuple[str, ...]:
-        """The options whose values a person must type: sizes, of which messages show examples."""
-        return tuple(name for name, _ in self.options if name in DIMENSIONS)
+        """The options whose values a person must type."""
+        return tuple(name for name, _ in self.options if name in TYPED)
 
     @property
     def text(self) -> str:
         """The options as they are typed."""
         if self.leaves_out:
             return f"leave {self.options[0][0]} out"
-        words = [f"--{name}" if name in DIMENSIONS or not value else f"--{name} {shlex.quote(value)}"
+        words = [f"--{name}" if name in TYPED or not value else f"--{name} {shlex.quote(value)}"
                  for name, value in self.options]  # fmt: skip
         return " ".join(words)
 
@@ -101,7 +105,7 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
         elif name in CHOICES and not value:
             choices = imported(CHOICES[name])
             answers += [Answer(((name, choice),)) for choice in (choices() if callable(choices) else choices)]
-        elif value or name in SWITCHES or name in DIMENSIONS:
+        elif value or name in SWITCHES or name in TYPED:
             if is_joined:
                 answers[-1] = Answer((*answers[-1].options, (name, value)))
             else:
@@ -149,6 +153,10 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
         slot = READING[name]
         if slot.reads is int and value.isdecimal():
             values[slot.name] = int(value)
+        elif slot.reads is float:
+            if isnan(number := number_in(value)):
+                raise InputError(f"--{name} needs a number such as 1.5, not '{value}'.")
+            values[slot.name] = number
         elif slot.reads in (str, int):
             values[slot.name] = value
         else:

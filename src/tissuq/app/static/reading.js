@@ -94,8 +94,12 @@ const columnsOf = (found, reading, change) => {
 const questionOf = (question, answer) => {
   const rows = question.answers.map(item => {
     if (!item.asked_for.length) return make("li", {}, button(item.label, () => answer(question, item.settings)), item.gives ? make("span", { className: "soft", textContent: item.gives }) : null);
-    const inputs = item.asked_for.map(name => make("input", { name, size: 8, placeholder: name === "area" ? "10 mm2" : "10 mm", aria: { label: name } }));
-    const use = () => answer(question, { dimensions: { ...item.settings.dimensions, ...Object.fromEntries(inputs.map(input => [input.name, input.value.trim()])) } });
+    const inputs = item.asked_for.map(name => make("input", { name, size: 8, placeholder: { area: "10 mm2", "axial-stretch": "1.5" }[name] ?? "10 mm", aria: { label: name } }));
+    const use = () => {
+      const { "axial-stretch": held, ...sizes } = Object.fromEntries(inputs.map(input => [input.name, input.value.trim()]));
+      const of_stretch = held === undefined ? {} : { axial_stretch: numberOf(held) };
+      answer(question, { ...item.settings, ...of_stretch, ...(Object.keys(sizes).length ? { dimensions: { ...item.settings.dimensions, ...sizes } } : {}) });
+    };
     return make("li", {}, ...inputs.flatMap(input => [`${input.name} `, input, " "]), button("Use", use));
   });
   const folded = rows.slice(question.shown);
