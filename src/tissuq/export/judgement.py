@@ -100,7 +100,7 @@ class JudgedLaw:
                 yield f"    {_label(name)}: {_percent(_largest(error[draw]))}, {_percent(_rms(error[draw]))}"
             if self.sizes[draw] > TOO_FAR:
                 yield "    WARNING: the card does NOT stand for the draw: do not compute with it"
-            elif not self.is_near[draw]:
+            if not self.is_near[draw]:
                 yield f"    WARNING: the card is more than {_percent(WANTED_ERROR)} off in a state that was measured"
         if not self.stable[draw]:
             yield "    WARNING: the card is NOT stable over the whole calibrated range"
