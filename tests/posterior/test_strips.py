@@ -123,3 +123,15 @@ def test_directions_along_one_axis_are_warned_of_and_along_two_are_not(strips):
     assert any(
         "several directions of the tissue (circ, axial)" in w and "--mode uniaxial@2" in w.shell for w in warnings
     )
+
+
+def test_a_law_that_is_wrong_is_sent_to_a_discrepancy_that_may_be_fitted():
+    truth, stretch = {"C10": 0.01, "k1": 0.05, "k2": 8.0}, np.linspace(1.05, 1.5, 30)
+    law = "neo-hookean+exponential-fibres@40"
+    stiffening = [
+        tq.simulate(law, truth, stretch, 2e-4, seed=seed, mode=mode)
+        for seed, mode in enumerate(("uniaxial", "uniaxial@2"))
+    ]
+    posterior = tq.fit(stiffening, material=LAW, discrepancy="none", tolerances=AS_TESTED)
+    (warning,) = (warning for warning in posterior.warnings if warning.code == "unmodelled-curve")
+    assert warning.shell.endswith("Fit with --discrepancy gp-pinned.")

@@ -175,7 +175,7 @@ def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning
             "the fitted curve departs systematically from the measured one, and the intervals do not include that: "
             f"{finding}. Fit with {{discrepancy}}.",
             "unmodelled-curve",
-            discrepancy="auto",
+            discrepancy=_describing_discrepancy(model),
         )
     text = f"{finding}: the errors of consecutive measurements are not independent, and the intervals are too narrow. "
     if any(curve.is_back.any() for curve in model.experiment.curves):
@@ -194,11 +194,20 @@ def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
         return ResultWarning(
             text + "See which of the tests departs from the others, and fit it by itself.", "unmodelled-curve"
         )
-    if model.energy_symbols or not model.material.is_isotropic:
+    if not model.noise.parameters and (model.energy_symbols or not model.material.is_isotropic):
         return ResultWarning(
             text + "Give a larger noise, or leave it unknown ({noise_sd}).", "unmodelled-curve", noise_sd="unknown"
         )
-    return ResultWarning(text + "Fit with {discrepancy}.", "unmodelled-curve", discrepancy="auto")
+    if model.energy_symbols:
+        return ResultWarning(text + "See where they depart from the curve.", "unmodelled-curve")
+    return ResultWarning(
+        text + "Fit with {discrepancy}.", "unmodelled-curve", discrepancy=_describing_discrepancy(model)
+    )
+
+
+def _describing_discrepancy(model: StatisticalModel) -> str:
+    """Return the discrepancy that describes what the law does not, where one may be fitted to these tests."""
+    return "gp-pinned" if model.derived_parameters else "auto"
 
 
 def _directions_of_one_fibre(model: StatisticalModel) -> str:
