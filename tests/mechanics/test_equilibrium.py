@@ -70,6 +70,32 @@ def test_fibres_along_axis_1_are_felt_across_it_by_their_matrix_alone():
     )
 
 
+def locking(first, second, mu, limit, k, phi):
+    """Return the stresses of both axes of Gent's law with standard fibres, the thickness free."""
+    third, I4 = 1 / (first * second), (first * np.cos(phi)) ** 2 + (second * np.sin(phi)) ** 2
+    slope = mu / 2 * limit / (limit - (first**2 + second**2 + third**2 - 3))
+    pull = 4 * k * max(I4 - 1, 0.0)
+    return (
+        2 * slope * (first - third**2 / first) + pull * first * np.cos(phi) ** 2,
+        2 * slope * (second - third**2 / second) + pull * second * np.sin(phi) ** 2,
+    )
+
+
+@pytest.mark.parametrize("use_jax", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_matrix_that_locks_not_far_from_there_is_in_equilibrium_too(use_jax):
+    values = [0.02, 0.7, 0.1, 0.7]
+    law, tension = material_named("gent+standard-fibres"), STRETCH[STRETCH > 1]
+    free = [brentq(lambda x, stretch=each: locking(stretch, x, *values)[1], 0.7, 1.0) for each in tension]
+    expected = [locking(stretch, lateral, *values)[0] for stretch, lateral in zip(tension, free, strict=True)]
+    found = engineering_stress(law, Uniaxial(), tension, values)
+    if use_jax:
+        grad = differentiator().grad(path_energy, argnums=4)
+        found = [
+            float(grad(law, Uniaxial().path, float(x), differentiator().numpy.array(values), 0.0)) for x in tension
+        ]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
 def test_many_parameter_values_are_those_of_each():
     law, values = material_named("holzapfel-gasser-ogden"), np.array([STIFF, SOFT, ACROSS])
     together = engineering_stress(law, Uniaxial(), STRETCH, values)

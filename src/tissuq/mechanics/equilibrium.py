@@ -94,9 +94,10 @@ def _logarithm_in_numpy(material: Material, deformation: Deformation, is_open: l
         return energy.imag / STEP
 
     with np.errstate(all="ignore"):
-        low, high = _ends(real, is_open)
+        isotropic = _isotropic(real, is_open)
+        low, high = isotropic - WIDEST, isotropic + WIDEST
         for _ in range(HALVINGS):
-            low, high = _halved(low, high, lateral_stress)
+            low, high, _ = _halved(low, high, isotropic, lateral_stress)
         return _refined(low, high, lateral_stress)
 
 
@@ -113,9 +114,10 @@ def _logarithm_in_jax(material: Material, deformation: Deformation, is_open: lis
 
         return jvp(energy, (logarithm,), (library(logarithm).ones_like(logarithm),))[1]
 
-    ends = lax.stop_gradient(_ends(deformation, is_open))
-    ends = lax.fori_loop(0, HALVINGS, lambda _, ends: _halved(ends[0], ends[1], lateral_stress), ends)
-    logarithm = lax.stop_gradient(_refined(ends[0], ends[1], lateral_stress))
+    isotropic = lax.stop_gradient(_isotropic(deformation, is_open))
+    ends = isotropic - WIDEST, isotropic + WIDEST, isotropic
+    low, high, _ = lax.fori_loop(0, HALVINGS, lambda _, ends: _halved(ends[0], ends[1], ends[2], lateral_stress), ends)
+    logarithm = lax.stop_gradient(_refined(low, high, lateral_stress))
     slope = (lateral_stress(logarithm + NEWTON_STEP) - lateral_stress(logarithm)) / NEWTON_STEP
     return logarithm - lateral_stress(logarithm, still=False) / slope
 
@@ -124,18 +126,21 @@ def _real(component: Any) -> Any:
     return component if component is None else np.real(component)
 
 
-def _ends(deformation: Deformation, is_open: list[Any]) -> tuple[Any, Any]:
-    """Return the least and the largest logarithm between which it is sought."""
+def _isotropic(deformation: Deformation, is_open: list[Any]) -> Any:
+    """Return the logarithm of the lateral stretch that an isotropic material has."""
     c11, c22, _ = (0.0 if component is None else component for component in deformation.plane)
-    isotropic = -0.25 * log(library(c11 + c22).where(is_open[0], c22, c11))
-    return isotropic - WIDEST, isotropic + WIDEST
+    return -0.25 * log(library(c11 + c22).where(is_open[0], c22, c11))
 
 
-def _halved(low: Any, high: Any, lateral_stress: Callable[[Any], Any]) -> tuple[Any, Any]:
-    """Return the half of an interval in which the lateral stress, which rises, changes its sign; where it is zero."""
-    middle = 0.5 * (low + high)
-    stress, where = lateral_stress(middle), library(middle).where
-    return where(stress <= 0, middle, low), where(stress < 0, high, middle)
+def _halved(low: Any, high: Any, isotropic: Any, lateral_stress: Callable[[Any], Any]) -> tuple[Any, Any, Any]:
+    """Return the half of an interval in which the lateral stress, which rises, changes its sign, or where it is zero.
+
+    Where there is none the material has locked, or its energy is too large: farther away than it can be.
+    """
+    middle, arrays = 0.5 * (low + high), library(low)
+    stress = lateral_stress(middle)
+    stress = arrays.where(arrays.isnan(stress), arrays.where(middle < isotropic, -1.0, 1.0), stress)
+    return arrays.where(stress <= 0, middle, low), arrays.where(stress < 0, high, middle), isotropic
 
 
 def _refined(low: Any, high: Any, lateral_stress: Callable[[Any], Any]) -> Any:
