@@ -135,3 +135,10 @@ def test_a_law_that_is_wrong_is_sent_to_a_discrepancy_that_may_be_fitted():
     posterior = tq.fit(stiffening, material=LAW, discrepancy="none", tolerances=AS_TESTED)
     (warning,) = (warning for warning in posterior.warnings if warning.code == "unmodelled-curve")
     assert warning.shell.endswith("Fit with --discrepancy gp-pinned.")
+
+
+def test_an_isotropic_material_of_both_axes_is_noted(strips):
+    options = {"discrepancy": "none", "noise_sd": NOISE, "tolerances": AS_TESTED}
+    shells = [warning.shell for warning in tq.fit(strips, **options).warnings]
+    assert any("--material holzapfel-gasser-ogden and --discrepancy gp-pinned" in shell for shell in shells)
+    assert not any("axis 2 of the tissue are taken" in warning for warning in tq.fit(strips[1], **options).warnings)
