@@ -353,7 +353,8 @@ def test_the_next_step_has_all_options_where_another_warning_proposes_the_same_a
 
 @pytest.mark.parametrize(("is_directed", "name"), [(False, "stable"), (True, "fibres")])
 def test_a_sheet_with_a_direction_needs_fibres_and_no_stable_draws_of_a_law_without(is_directed, name):
-    law = SimpleNamespace(material=material_named("neo-hookean"), energy_symbols=("c1",))
+    tests = SimpleNamespace(is_along_both_axes=False)
+    law = SimpleNamespace(material=material_named("neo-hookean"), energy_symbols=("c1",), experiment=tests)
     solution = SimpleNamespace(model=law, is_of_data=True, is_directed=is_directed)
     uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
     unstable = ResultWarning("unstable more often than stable.", "unstable")

@@ -142,3 +142,8 @@ def test_an_isotropic_material_of_both_axes_is_noted(strips):
     shells = [warning.shell for warning in tq.fit(strips, **options).warnings]
     assert any("--material holzapfel-gasser-ogden and --discrepancy gp-pinned" in shell for shell in shells)
     assert not any("axis 2 of the tissue are taken" in warning for warning in tq.fit(strips[1], **options).warnings)
+
+
+def test_the_next_step_where_both_axes_are_no_isotropic_material_is_a_law_with_fibres(strips):
+    posterior = tq.fit(strips, noise_sd=NOISE, tolerances=AS_TESTED, discrepancy="log")
+    assert "--discrepancy gp-pinned" in posterior.answer.next_step.shell

@@ -40,6 +40,12 @@ STEPS: Mapping[str, Step] = {
         "(tissuq materials lists others).",
         'fit a law with fibres, which has the preferred direction: fit again with material="holzapfel-gasser-ogden".',
     ),
+    "strips": Step(
+        "fit a law with fibres to the tests along both axes: fit again with --material holzapfel-gasser-ogden "
+        "--discrepancy gp-pinned.",
+        'fit a law with fibres to the tests along both axes: fit again with material="holzapfel-gasser-ogden" and '
+        'discrepancy="gp-pinned".',
+    ),
     "zero": Step(
         "take off what the load cell shows at rest: fit again with {options}.",
         'take off what the load cell shows at rest, as the warning says: read again with load_zero="first".',
@@ -108,6 +114,8 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
     is_plain_law = solution.is_of_data and not model.energy_symbols and model.material.is_isotropic
     if is_plain_law and not has_code(warnings, "stress-at-rest"):
         return STEPS["auto"]
+    if model.material.is_isotropic and model.experiment.is_along_both_axes and reporting is not Verdict.YES:
+        return STEPS["strips"]
     for warning in warnings:
         is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))
         if warning.severity is Severity.CAUTION and warning.code in STEPS_OF_WARNINGS and is_due:

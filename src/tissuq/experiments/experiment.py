@@ -268,6 +268,11 @@ class Experiment:
         return is_known and not np.any(plane[2]) and all(len(test.curves) > 1 for test in self.tests)
 
     @property
+    def is_along_both_axes(self) -> bool:
+        """Whether there are tests in one loading mode along axis 1 and along axis 2 of the tissue."""
+        return any(mode.along_axis_1 != mode and mode.along_axis_1 in self.modes for mode in self.modes)
+
+    @property
     def mode(self) -> LoadingMode:
         """How the specimen was loaded in the test."""
         return self._only_test[0].mode

@@ -82,7 +82,7 @@ def warnings_about(
             Severity.PROBLEM,
             mode="uniaxial@2",
         )
-    if _has_both_axes(solution.model):
+    if solution.model.material.is_isotropic and solution.model.experiment.is_along_both_axes:
         yield ResultWarning(
             "tests along axis 1 and along axis 2 of the tissue are taken for those of one isotropic material. One with "
             "fibres is fitted with {material} and {discrepancy}.",
@@ -227,12 +227,6 @@ def _directions_of_one_fibre(model: StatisticalModel) -> str:
     )
     directions = max(along_1, along_2, key=len)
     return "" if model.material.is_isotropic or len(directions) < 2 else ", ".join(directions)
-
-
-def _has_both_axes(model: StatisticalModel) -> bool:
-    """Return whether an isotropic material is fitted to one loading mode along both axes of the tissue."""
-    modes = model.experiment.modes
-    return model.material.is_isotropic and any(m.along_axis_1 != m and m.along_axis_1 in modes for m in modes)
 
 
 def _is_sum_of_variances(model: StatisticalModel) -> bool:
