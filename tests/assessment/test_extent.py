@@ -8,6 +8,8 @@ import pytest
 import gallery
 import tissuq as tq
 from tissuq.assessment import measurement_warnings
+from tissuq.assessment.extent import assess
+from tissuq.errors import ConvergenceError
 
 STRETCH = np.array([0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.5, 1.7, 2.0, 2.4])
 TRUTH = {"C10": 1.0, "C20": 0.2, "C30": 0.0}
@@ -71,6 +73,17 @@ def test_the_shift_is_that_of_a_fit_with_the_other_scale(data):
     means = [each.summary().loc["C10", "mean"] for each in (posterior, other)]
     shift = (means[1] - means[0]) / posterior.summary().loc["C10", "sd"]
     assert posterior.assess().shifts[4.0] == pytest.approx(shift, abs=1e-6)
+
+
+def test_scales_that_the_method_does_not_solve_are_left_out(data):
+    posterior = gallery.fit(data, discrepancy="taylor", tolerances="specimen")  # at the level of its unknown noise
+
+    def without_end(models):
+        raise ConvergenceError("few points are effective")
+
+    found = assess(posterior.solution, posterior.solver.solve, without_end, posterior.stable_ranges)
+    assert found.shifts == {}
+    assert found.share == posterior.assess().share
 
 
 def test_members_and_what_is_between_them(data):

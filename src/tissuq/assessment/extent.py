@@ -244,8 +244,11 @@ def assess(
     scales = scale_symbols(model)
     is_rescaled = bool(scales) and solution.diagnostics is None
     likely = at_level(model)  # where the noise would be summed over, other priors are tried at its level
-    reference = solve_alike([likely])[0] if is_rescaled and likely is not model else solution
-    rescaled_solutions = _rescaled(likely, solve_alike) if is_rescaled else {}
+    reference, rescaled_solutions = solution, dict[str, Solution]()
+    if is_rescaled:
+        with suppress(ConvergenceError):
+            reference = solution if likely is model else solve_alike([likely])[0]
+            rescaled_solutions = _rescaled(likely, solve_alike)
     expected = reference.marginals[model.headline].mean
     return Assessment(
         parameter=model.headline,
