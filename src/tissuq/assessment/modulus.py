@@ -43,8 +43,8 @@ def derived_marginal(solution: Solution, symbol: str) -> Marginal:
     """Return the marginal posterior of one of the model's `derived_parameters`, a ratio times a linear parameter."""
     model, mixture = solution.model, solution.mixture
     number = [parameter.symbol for parameter in model.material.plain.parameters].index(symbol)
-    units = model.material.unit_values(values_of(model, mixture, model.bent_symbols)[0])  # (M, p, k)
-    factors = np.array([[model.material.plain_values(unit)[number] for unit in component] for component in units])
+    units = model.material.unit_values(values_of(model, mixture, model.bent_symbols)[0])
+    factors = model.material.plain_values(np.moveaxis(units, -1, 0))[number]
     columns = [model.column_symbols.index(p.symbol) for p in model.material.parameters if p.is_linear]
     mean, root = coefficients(model, mixture)
     means = (factors * mean[:, columns]).sum(axis=1)

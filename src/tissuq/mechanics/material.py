@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import accumulate, chain, combinations, pairwise
 from math import pi
@@ -16,7 +17,7 @@ from tissuq.experiments.modes import Deformation
 from tissuq.parameters.parameter import Parameter
 from tissuq.registry import variants
 
-__all__ = ["SUMS", "Material", "MaterialSum", "StretchMaterial", "materials"]
+__all__ = ["SUMS", "Material", "MaterialSum", "StretchMaterial", "axes_felt_by", "materials"]
 
 SUMS = {
     "standard-reinforcing": "neo-hookean+standard-fibres",
@@ -180,7 +181,7 @@ class MaterialSum(Material):
     @property
     def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
         """The axes that some summand feels."""
-        return tuple(sorted({axis for material in self.summands for axis in material.felt_axes}))
+        return axes_felt_by(self.summands)
 
     @property
     def shears(self) -> bool:  # type: ignore[override]
@@ -215,6 +216,11 @@ class MaterialSum(Material):
         """Return every summand with its values."""
         ends = pairwise(accumulate((len(material.parameters) for material in self.summands), initial=0))
         return [(material, values[start:end]) for material, (start, end) in zip(self.summands, ends, strict=True)]
+
+
+def axes_felt_by(materials: Iterable[Material]) -> tuple[int, ...]:
+    """Return the axes that one of some materials feels."""
+    return tuple(sorted({axis for material in materials for axis in material.felt_axes}))
 
 
 def materials() -> dict[str, type[Material]]:

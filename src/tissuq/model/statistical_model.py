@@ -114,6 +114,11 @@ class StatisticalModel(ErrorModel):
         return tuple(p for p in self.material.plain.parameters if p.symbol not in self.material_symbols)
 
     @property
+    def reported_parameters(self) -> tuple[Parameter, ...]:
+        """Every parameter, those that follow from others last."""
+        return (*self.parameters, *self.derived_parameters)
+
+    @property
     def symbols(self) -> tuple[str, ...]:
         """The symbol of every parameter."""
         return tuple(p.symbol for p in self.parameters)

@@ -24,6 +24,7 @@ from tissuq.mechanics import Material, StretchMaterial
 from tissuq.mechanics.draws import Continuation, PiecewiseEnergy, sum_of_energies
 from tissuq.mechanics.equilibrium import has_free_axis
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
+from tissuq.mechanics.material import axes_felt_by
 from tissuq.mechanics.stress import stresses_at, stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.pictures.prediction import curves
@@ -106,7 +107,7 @@ class EnergyDraw(StretchMaterial):
     @property
     def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
         """The axes that some part feels."""
-        return tuple(sorted({axis for material, _ in self.parts for axis in material.felt_axes}))
+        return axes_felt_by(material for material, _ in self.parts)
 
     @property
     def shears(self) -> bool:  # type: ignore[override]

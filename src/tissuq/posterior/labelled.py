@@ -34,8 +34,7 @@ def labelled_arrays(
     chains, draws = (np.arange(size) for size in solution.shape)
     sample = {"chain": chains, "draw": draws}
     thinned_sample = {"chain": chains, "draw": draws[:: stride(solution)]}
-    model = solution.model
-    parameters = {parameter.symbol: parameter for parameter in (*model.parameters, *model.derived_parameters)}
+    parameters = {parameter.symbol: parameter for parameter in solution.model.reported_parameters}
     scales = {symbol: unit.to_mpa if parameter.unit else 1.0 for symbol, parameter in parameters.items()}
     in_stress, of_mpa = {"units": unit.name}, {"density_of": "stresses in MPa"}
     coordinates = {"stretch": ("measurement", experiment.states.abscissa, {"units": "1"})}
@@ -123,7 +122,7 @@ def summaries(
     """Return mean, sd, median and interval of the parameters that are asked for, in MPa; see `Posterior.summary`."""
     model = solution.model
     check_probability(prob)
-    symbols = (*model.symbols, *(parameter.symbol for parameter in model.derived_parameters))
+    symbols = tuple(parameter.symbol for parameter in model.reported_parameters)
     wanted = symbols if parameters is None else tuple(parameters)
     unknown = [symbol for symbol in wanted if symbol not in symbols]
     if unknown:
@@ -135,8 +134,7 @@ def summaries_in(
     unit: StressUnit, solution: Solution, prob: float = 0.95, parameters: Sequence[str] | None = None
 ) -> dict[str, dict[str, float]]:
     """Return `summaries` with parameters that are stresses in a unit."""
-    model = solution.model
-    scales = {p.symbol: unit.to_mpa if p.unit else 1.0 for p in (*model.parameters, *model.derived_parameters)}
+    scales = {p.symbol: unit.to_mpa if p.unit else 1.0 for p in solution.model.reported_parameters}
     return {
         symbol: {name: value / scales[symbol] if name in OF_VALUES else value for name, value in numbers.items()}
         for symbol, numbers in summaries(solution, prob, parameters).items()

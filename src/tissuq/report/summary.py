@@ -104,7 +104,7 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
         table = summaries_in(unit, posterior.solution)
         model = posterior.model
         priors = {p.symbol: model.priors[p.symbol].scaled(1 / unit.to_mpa if p.unit else 1.0) for p in model.parameters}
-        for parameter in (*model.parameters, *model.derived_parameters):
+        for parameter in model.reported_parameters:
             numbers = table[parameter.symbol]
             rows.append(
                 {

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.experiments.modes.mode import Control, LoadingMode
+from tissuq.experiments.modes.mode import AlongAxis2, Control, LoadingMode
 from tissuq.experiments.modes.one_control import Planar
 from tissuq.experiments.modes.path import Deformation, Path
 
@@ -167,5 +167,4 @@ class ImposedStretches(LoadingMode):
         return f"{self.mode.name} along axis {self.axis}"
 
     def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
-        stretch_1, stretch_2, stretch_3 = self.mode.principal_stretches(point)
-        return (stretch_1, stretch_2, stretch_3) if self.axis == 1 else (stretch_2, stretch_1, stretch_3)
+        return (self.mode if self.axis == 1 else AlongAxis2(self.mode)).principal_stretches(point)

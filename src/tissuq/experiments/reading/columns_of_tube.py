@@ -176,12 +176,10 @@ def _force(table: Table, columns: Mapping[str, str | int], quantities: Sequence[
         return given[0], find_column(table, given[0], columns[given[0]]), True
     found = _forces(table, quantities)
     if len(found) != 1:
-        labels = " and ".join(table.label(column) for column in found)
-        fault = f"columns {labels} may each be" if found else "no column is recognised as"
         raise InputError(
-            f"{table.file}: {fault} the axial force of a tube. Say which it is: --column force=NAME, or "
-            "--column total_force=NAME where the pressure on the closed ends is in it; without a force give --mode "
-            "inflated-tube."
+            f"{table.file}: {_unclear(table, [*found])} the axial force of a tube. Say which it is: --column "
+            "force=NAME, or --column total_force=NAME where the pressure on the closed ends is in it; without a force "
+            "give --mode inflated-tube."
         )
     ((column, role),) = found.items()
     return role, column, any(quantities[column] in ROLES[force] for force in FORCES)
@@ -241,16 +239,21 @@ def with_columns_of_tube(
     for role in (PRESSURE, diameter):
         columns = by_role.get(role, [])
         if role not in mapping and len(columns) != 1:
-            labels = " and ".join(map(table.label, columns))
-            fault = f"columns {labels} may each be" if labels else "no column is recognised as"
             raise InputError(
-                f"{table.file}: {fault} the {role.replace('_', ' ')} of a tube. Say which it is: --column {role}=NAME."
+                f"{table.file}: {_unclear(table, columns)} the {role.replace('_', ' ')} of a tube. Say which it is: "
+                f"--column {role}=NAME."
             )
     if not isinstance(mode, Planar | InflatedTube | ThinTube):
         names = " and ".join(table.label(by_role[role][0]) for role in (PRESSURE, diameter) if role in by_role)
         advice = "" if tube_roles else " To read other columns, say which: --column stretch=NAME --column force=NAME."
         raise InputError(f"{table.file} is of a tube under pressure ({names}). {HOW_TO_READ_TUBE}{advice}")
     return {role: mapping.get(role, by_role.get(role, [0])[0] + 1) for role in (PRESSURE, diameter)}
+
+
+def _unclear(table: Table, columns: Sequence[int]) -> str:
+    """Return how a sentence begins that no column, or several, may be something."""
+    labels = " and ".join(map(table.label, columns))
+    return f"columns {labels} may each be" if labels else "no column is recognised as"
 
 
 def _of_role(table: Table, quantities: Sequence[str], role: str, *, may_be_held: bool) -> Iterator[int]:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.experiments.modes.path import STEP
+
 __all__ = ["EVERY_LAW", "LawMixture", "not_negative"]
 
 FloatArray = NDArray[np.float64]
@@ -18,7 +20,6 @@ RATES_OF_FIBRES, RATES_OF_MATRIX = np.geomspace(0.1, 60, 16), np.geomspace(0.1, 
 EXPONENTS = (3, 4, 5, 7, 9, 11, 14, 18)
 STEEPEST = 30.0
 """Logarithm by which an exponential law may grow over a wall and a test: a steeper one follows single measurements."""
-STEP = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
