@@ -311,7 +311,7 @@ def test_what_is_said_to_be_too_narrow_is_used_with_care_at_best():
     correlated = ResultWarning("residuals are autocorrelated.", "correlated-residuals")
     for use in posterior.answer_with([correlated]).uses[:2]:
         assert use.verdict is Verdict.CARE
-        assert "the errors of consecutive measurements hang together" in use.reason
+        assert "the errors of consecutive measurements are correlated" in use.reason
 
 
 def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():

@@ -241,7 +241,7 @@ def test_draws_of_fibres_with_a_free_energy_spread_as_the_posterior_does():
 
 
 def test_draws_of_two_posteriors_are_paired_at_random_once_one_is_shuffled():
-    """Sequences of other seeds that are spread alike hang together row by row."""
+    """Sequences of other seeds that are spread alike are correlated row by row."""
     stretch = np.linspace(0.8, 1.3, 9)
     data = tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.02, seed=1)
     posterior = tq.fit(data, discrepancy="none", noise_sd=0.02)

@@ -10,7 +10,13 @@ import pytest
 
 import tissuq as tq
 from tissuq.errors import InputError
-from tissuq.validation.tissues import TissueSettings, read_corpus, run_benchmark, summarise_tissues
+from tissuq.validation.tissues import (
+    TissueSettings,
+    read_corpus,
+    run_benchmark,
+    summarise_tissues,
+    summarise_verdicts,
+)
 from tissuq.validation.tissues.benchmark import PROTOCOLS, RIVALS, carry_out, predicted, tasks_of
 
 BIAXIAL = """mode,stretch,stress_MPa,stretch_2,stress_2_MPa,direction,specimen
@@ -128,6 +134,34 @@ def test_scores_are_those_of_a_normal_predictive_distribution():
     assert scores["error"] == pytest.approx(np.sqrt(np.mean((centre - new.stress) ** 2)) / size, rel=1e-6)
     beyond = np.maximum(standard - 1.9599640, 0) * spread
     assert scores["score"] == pytest.approx(np.mean(2 * 1.9599640 * spread + 40 * beyond) / size, rel=1e-6)
+
+
+def test_verdicts_are_set_against_what_came_true():
+    alike = {"protocol": "modes", "formulation": "auto"}
+    moduli = {"modulus_low": 0.4, "modulus_of_predicted": 0.5, "modulus_high": 0.8, "modulus_mean": 0.6}
+    results = [
+        alike | {"verdict": "yes", "inside_95": 1.0, "error": 0.1, "modulus_verdict": "with care"} | moduli,
+        alike | {"verdict": "yes", "inside_95": 0.8, "error": 0.3, "modulus_verdict": "no"} | moduli,
+        alike | {"verdict": "no", "inside_95": 0.9, "error": 2.0, "modulus_verdict": "with care"} | moduli
+        | {"modulus_mean": 0.9, "modulus_low": 0.6, "modulus_high": 1.2},
+        alike | {"failure": "of some kind"},
+        alike | {"protocol": "ends", "inside_95": 1.0, "error": 0.1},
+    ]  # fmt: skip
+    columns = ["quantity", "verdict", "predictions", "held", "error", "precise", "of_use"]
+    assert summarise_verdicts(results)[columns].to_numpy().tolist() == [
+        ["modulus", "with care", 2, 0.5, pytest.approx(0.5), 0.5, 0.5],
+        ["modulus", "no", 1, 1.0, pytest.approx(0.2), 1.0, 1.0],
+        ["stress", "yes", 2, 0.9, 0.2, 0.5, 1.0],
+        ["stress", "no", 1, 0.9, 2.0, 0.0, 0.0],
+    ]
+    assert summarise_verdicts(results[-2:]).empty
+
+
+def test_the_verdict_is_on_the_mode_that_is_predicted(folder):
+    settings = TissueSettings(folder=str(folder), sets=("sheet",), protocols=("specimens",), formulations=("none",))
+    split, *_ = PROTOCOLS["specimens"](read_corpus(folder)[-1].tests)
+    posterior = tq.fit(split.fitted, discrepancy="none", tolerances="specimen")
+    assert carry_out(settings, tasks_of(settings)[0])["verdict"] == posterior.answer.uses[1].verdict
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ def widening_of_lag(lag: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """What turns measurements whose errors differ and hang together into ones of independent errors of sd noise_sd.
+    """What turns measurements whose errors differ and are correlated into ones of independent errors of sd noise_sd.
 
     Their covariance is noise_sd^2 D A^-1 (I + U diag(spread) U') A^-T D with D = diag(size) and orthonormal U; A takes
     from every error what the one before it lets expect, so that the errors before are those of first-order
@@ -94,7 +94,7 @@ class Whitening:
     def precisions(self, white: FloatArray) -> FloatArray:
         """Return the diagonals (m, n) of the inverse covariances of the measurements, given those of whitened ones.
 
-        Where errors hang together, whitened measurements must have one precision.
+        Where errors are correlated, whitened measurements must have one precision.
         """
         diagonal, off_diagonal = 1 / self._fresh, np.append((self.lag / self._fresh)[1:], 0.0)
         along = diagonal[:, None] * self.along - off_diagonal[:, None] * np.vstack([self.along[1:], self.along[:1]])

@@ -246,7 +246,7 @@ class NextTest:
     ) -> FloatArray:
         """Return the sd (M, n) of all that is independent from measurement to measurement.
 
-        Errors that hang together from one to the next, if the test is sampled as those of the data, tell as little as
+        Errors that are correlated from one to the next, if the test is sampled as those of the data, tell as little as
         larger independent ones.
         """
         model = self.model

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tissuq.assessment.uses import PRECISE, USEFUL
 from tissuq.drawing.panels import legend_above
 from tissuq.report.coverage import numbers_of_shares
 from tissuq.report.coverage_figures import dots_by_row, panel_grid, shares_figure
 from tissuq.report.result import Picture, Result, Section, Table
 from tissuq.report.tables import significant
-from tissuq.validation.tissues import TissueSettings, summarise_tissues
+from tissuq.validation.tissues import TissueSettings, summarise_tissues, summarise_verdicts
 from tissuq.validation.tissues.benchmark import ALL, PROBABILITIES, TARGET_HALF_WIDTH, TARGET_INSIDE
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def tissue_result(settings: TissueSettings, results: list[dict[str, Any]]) -> Re
         sections=_sections(settings, summary, results, sets),
         files={
             "summary.csv": summary,
+            "verdicts.csv": summarise_verdicts(results),
             "predictions.csv": predictions,
         },
     )  # fmt: skip
@@ -113,13 +115,40 @@ def _sections(
         f"At most {settings.points} measurements are taken from a test, and at most {settings.predictions} predictions "
         "are made for each set and protocol.",
     ]
-    sections = [Section("By class of tissue", (figure,)), Section("How to read it", (tuple(reading),))]
+    sections = [
+        Section("By class of tissue", (figure,)),
+        *_verdicts(summarise_verdicts(results)),
+        Section("How to read it", (tuple(reading),)),
+    ]
     failed = [row for row in results if "failure" in row]
     if failed:
         texts = {f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in failed}
         sections.append(Section("Not predicted", (tuple(sorted(texts)),)))
     origin = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
     return (*sections, Section("Sets", (f"{', '.join(sets)}{origin}.",)))
+
+
+def _verdicts(summary: pd.DataFrame) -> tuple[Section, ...]:
+    """Return how far predictions were off, by what the fit said that it could be used for."""
+    if summary.empty:
+        return ()
+    limits = [f"off by at most {100 * limit:g} %" for limit in (PRECISE, USEFUL)]
+    rows = [
+        [
+            f"{row['quantity']}: {TESTS[row['protocol']].lower()}",
+            *(str(row[name]) for name in ("formulation", "verdict", "predictions")),
+            *(_percent(row[name]) for name in ("held", "error", "precise", "of_use")),
+        ]
+        for row in summary.to_dict("records")
+    ]
+    text = (
+        f"A fit says 'yes' where it claims to know a stress or a modulus to {100 * PRECISE:g} %, and 'with care' up to "
+        f"{100 * USEFUL:g} % or where something speaks against it. Of the predictions under a verdict: the mean share "
+        "of the measurements (or of the moduli of the predicted tests) in 95 % intervals, the median error, and how "
+        "many were off by no more than such claims."
+    )
+    table = Table(["predicted", "formulation", "verdict", "predictions", "in 95 %", "error", *limits], rows, "", (1, 2))
+    return (Section("Do the verdicts hold?", (text, table)),)
 
 
 def _table(protocol: str, summary: pd.DataFrame) -> Table:

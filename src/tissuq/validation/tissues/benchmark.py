@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
+from tissuq.assessment.uses import PRECISE, USEFUL, Verdict
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics import material_named
@@ -42,6 +43,7 @@ __all__ = [
     "predicted",
     "run_benchmark",
     "summarise_tissues",
+    "summarise_verdicts",
     "tasks_of",
 ]
 
@@ -51,12 +53,15 @@ PROBABILITIES = (0.5, 0.8, 0.95)
 """Of the intervals whose coverage is counted; the last is that of half widths and scores."""
 TARGET_INSIDE, TARGET_HALF_WIDTH = 0.9, 0.5
 """Share of the measurements in the band, and half width relative to the stress, that make a prediction useful."""
-MODULUS = ("modulus_low", "modulus_of_predicted", "modulus_high")
-"""Initial shear moduli, MPa: the interval of the fitted tests, and the median of the predicted one between its ends."""
+MODULUS = ("modulus_low", "modulus_of_predicted", "modulus_high", "modulus_mean")
+"""Initial shear moduli, MPa: the interval of the fitted tests, the median of the predicted one between its ends, and
+the mean of the fitted ones."""
 MODULI = "modes"
 """The protocol that compares initial shear moduli, too: that of the fitted tests with that of the predicted one."""
 ALL = "all"
 """The class of all tissues together."""
+BEYOND_THE_RANGE = ("ends",)
+"""Protocols whose predictions leave the range of the fitted tests, of which no verdict speaks."""
 END_SHARE = 0.3
 """Share of the range of a test, farthest from the reference, that is predicted from the rest of it."""
 MIN_FITTED = 4
@@ -247,11 +252,15 @@ def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
         options["tolerances"] = Tolerances(estimand if settings.tolerances is None else "", **settings.tolerances or {})
     try:
         posterior = fit(fitted, **options)
+        modulus_use, own_tests, other_modes, _ = posterior.answer.uses
         row |= predicted(posterior, target)
+        if task.protocol not in BEYOND_THE_RANGE:
+            row["verdict"] = (own_tests if target.mode in posterior.model.experiment.modes else other_modes).verdict
         if task.protocol == MODULI:
             of_target = fit(target, **options).initial_shear_modulus
             low, high = posterior.initial_shear_modulus.hdi(PROBABILITIES[-1])
             row |= {"modulus_low": low, "modulus_high": high, "modulus_of_predicted": float(of_target.quantile(0.5))}
+            row |= {"modulus_mean": posterior.initial_shear_modulus.mean, "modulus_verdict": modulus_use.verdict}
         return row
     except (TissuqError, np.linalg.LinAlgError) as error:
         return row | {"failure": str(error)}
@@ -330,6 +339,37 @@ def summarise_tissues(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
     for name in (*scores, "useful", "modulus_inside", "modulus_ratio"):
         summary[name] = groups[name].mean() if "inside" in name or name == "useful" else groups[name].median()
     return summary.reset_index()
+
+
+def summarise_verdicts(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Return one row a protocol, formulation and verdict on what was predicted, the best verdict first.
+
+    What is predicted, ``quantity``, is the stress of a test, and where one mode is predicted from another the initial
+    shear modulus, too: its mean from the fitted tests against the median from the predicted one.
+
+    Columns: ``predictions``; ``held``, the mean share of measurements (or of moduli) in 95 % intervals; ``error``, the
+    median error of the centre, relative to the stress (or modulus) itself; and ``precise`` and ``of_use``, the shares
+    of predictions that are off by no more than what a verdict of yes, and one of care, claims (`assessment.uses`).
+    """
+    import pandas as pd
+
+    table = pd.DataFrame(results).reindex(
+        columns=["protocol", "formulation", "verdict", "inside_95", "error", "modulus_verdict", *MODULUS]
+    )
+    low, modulus, high = (table[name] for name in MODULUS[:3])
+    of_modulus = table.assign(
+        quantity="modulus",
+        verdict=table["modulus_verdict"],
+        held=((low <= modulus) & (modulus <= high)).astype(float),
+        error=(table["modulus_mean"] / modulus - 1).abs(),
+    )
+    rows = pd.concat([table.assign(quantity="stress", held=table["inside_95"]), of_modulus]).dropna(subset="verdict")
+    for name, order in (("protocol", PROTOCOLS), ("verdict", tuple(Verdict))):
+        rows[name] = pd.Categorical(rows[name], list(order))
+    rows["precise"], rows["of_use"] = ((rows["error"] <= limit).astype(float) for limit in (PRECISE, USEFUL))
+    groups = rows.groupby(["quantity", "protocol", "formulation", "verdict"], observed=True)
+    summary = groups[["held", "precise", "of_use"]].mean()
+    return summary.assign(predictions=groups.size(), error=groups["error"].median()).reset_index()
 
 
 @lru_cache(maxsize=1)
