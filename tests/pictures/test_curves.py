@@ -3,7 +3,7 @@ import pytest
 
 import gallery
 import tissuq as tq
-from tissuq.pictures.curves import described, share_along, ways_of
+from tissuq.pictures.curves import described, held_along, share_along, ways_of
 
 BIAXIAL = tq.loading_modes()["biaxial"]()
 
@@ -42,6 +42,31 @@ def test_points_that_follow_no_path_are_drawn_by_themselves(points):
     ways = ways_of(BIAXIAL, points, points[:, 0])
     assert not any(way.is_curve for way in ways)
     assert sorted(np.concatenate([way.indices for way in ways])) == list(range(len(points)))
+
+
+def test_a_test_that_jumps_to_another_held_stretch_follows_a_path_at_each():
+    hoop = np.linspace(0.9, 1.3, 20)
+    points = np.concatenate([np.column_stack([hoop - 0.1 * n, np.full(20, 1.2 + 0.2 * n)]) for n in range(3)])
+    ways = ways_of(tq.loading_modes()["thin-tube"](), points, points[:, 0])
+    assert [way.indices.tolist() for way in ways] == [list(range(20 * n, 20 * n + 20)) for n in range(3)]
+    assert all(way.is_curve for way in ways)
+    assert [held_along(BIAXIAL, points[way.indices]) for way in ways] == [
+        f"stretch of axis 2 {at}" for at in ("1.2", "1.4", "1.6")
+    ]
+
+
+@pytest.mark.parametrize("channel", [0, 1])
+def test_a_stress_is_drawn_against_its_own_stretch_unless_that_is_held(channel):
+    up = np.linspace(1.0, 1.2, 8)
+    stress = np.column_stack([up, up])
+    both = tq.Experiment("biaxial", np.column_stack([up, 1 + 0.5 * (up - 1)]), stress).curves[channel]
+    assert (both.drawn_name, both.drawn_at().tolist()) == (
+        f"stretch of axis {channel + 1}",
+        both.points[:, channel].tolist(),
+    )
+    held = 1 + 1e-3 * np.sin(np.arange(8))
+    strip = tq.Experiment("biaxial", np.column_stack([up, held]), stress).curves[channel]
+    assert (strip.drawn_name, strip.drawn_at().tolist()) == ("stretch of axis 1", up.tolist())
 
 
 def test_a_tube_is_drawn_along_a_curve_at_each_axial_stretch():

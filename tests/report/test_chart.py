@@ -146,6 +146,18 @@ def test_paths_of_a_test_with_two_controls_are_drawn_by_themselves():
         np.testing.assert_allclose(test["x"], x, rtol=1e-4)
         np.testing.assert_allclose(test["measured_at"], x, rtol=1e-4)
         assert "path" in test["name"]
+    assert [test["control"] for test in data["tests"][:4]] == 2 * ["stretch of axis 1"] + 2 * ["stretch of axis 2"]
+
+
+def test_a_stress_along_an_axis_that_is_held_is_drawn_against_the_other_one():
+    up = np.linspace(1.02, 1.2, 8)
+    points = np.concatenate([np.column_stack([up, np.full(8, held)]) for held in (1.0, 1.1)])
+    measured = tq.simulate("neo-hookean", {"C10": 0.5}, points, noise_sd=0.02, seed=2, mode="biaxial")
+    data = chart_data({"none": tq.fit(measured, discrepancy="none", noise_sd=0.02)}, "none", KPA)
+    for number, test in enumerate(data["tests"][:4]):
+        np.testing.assert_allclose(test["x"], up, rtol=1e-4)
+        assert test["control"] == "stretch of axis 1"
+        assert test["name"].endswith(f", stretch of axis 2 {(1.0, 1.1)[number % 2]:g}")
 
 
 def test_measurements_that_are_no_curve_are_drawn_where_they_were_made_however_many(monkeypatch):

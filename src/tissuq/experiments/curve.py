@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,13 +70,23 @@ class Curve:
 
     @property
     def abscissa(self) -> FloatArray:
-        """What the stress is drawn against, (n,)."""
+        """The strain along which the stress acts, (n,)."""
         return np.asarray(self.path.abscissa(self.points))
 
+    @cached_property
+    def drawn_against(self) -> int:
+        """The number of the control that the stress is drawn against: what it acts along, unless that is held."""
+        return self.mode.drawn_against(self.channel, self.points)
+
     @property
-    def abscissa_name(self) -> str:
-        """What `abscissa` is called on an axis."""
-        return self.mode.abscissa_control.name
+    def drawn_name(self) -> str:
+        """What an axis is called along which the stress is drawn."""
+        return self.mode.controls[self.drawn_against].name
+
+    def drawn_at(self, points: FloatArray | None = None) -> FloatArray:
+        """Return where on that axis the stress at points (g,) or (g, c) of the mode stands, or at those measured."""
+        points = self.points if points is None else points
+        return points if points.ndim == 1 else np.asarray(points[:, self.drawn_against])
 
     @property
     def is_back(self) -> NDArray[np.bool_]:
@@ -93,11 +104,11 @@ def draw_curves(drawn: Panels, curves: Sequence[Curve], unit_name: str) -> None:
     unit, size = stress_unit(unit_name), relative_size()
     for number, (axis, curve) in enumerate(zip(drawn.axes, curves, strict=True)):
         axis.axhline(0, color=BASE, lw=0.6 * size, zorder=0.5)
-        axis.axvline(float(curve.path.abscissa(curve.mode.reference)), color=BASE, lw=0.6 * size, zorder=0.5)
+        axis.axvline(curve.mode.controls[curve.drawn_against].reference, color=BASE, lw=0.6 * size, zorder=0.5)
         error = curve.standard_error / unit.to_mpa
-        points(axis, curve.abscissa, curve.stress / unit.to_mpa, error=error, label="measured",
+        points(axis, curve.drawn_at(), curve.stress / unit.to_mpa, error=error, label="measured",
                is_back=curve.is_back)  # fmt: skip
-        axis.set_xlabel(curve.abscissa_name)
+        axis.set_xlabel(curve.drawn_name)
         if number % drawn.columns == 0 or len(curve.mode.stresses) > 1:
             axis.set_ylabel(f"{curve.quantity} [{unit.name}]")
         if drawn.is_new:

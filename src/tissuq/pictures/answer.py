@@ -57,7 +57,7 @@ def answer(described: Sequence[Described], drawn: Panels, unit: StressUnit) -> N
     if drawn.strips:
         _draw_strips(drawn, solution, prob)
     for axis, curve in zip(drawn.lowest, curves, strict=True):
-        axis.set_xlabel(curve.abscissa_name)
+        axis.set_xlabel(curve.drawn_name)
     drawn.explain()
 
 
@@ -85,7 +85,7 @@ def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) ->
         _draw_share(axis, solution, curve, prob)
         if len(curves) > 1:
             axis.set_title(shortened(curve.name, drawn.letters))
-        axis.set_xlabel(curve.abscissa_name)
+        axis.set_xlabel(curve.drawn_name)
     for number, axis in enumerate(drawn.axes):
         if number % drawn.columns == 0:
             axis.set_ylabel("share of the discrepancy [%]")
@@ -104,11 +104,12 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     limits = limits_of([measured, median], [low, high])
     with small_panels(1) as (figure, drawn):
         (axis,) = drawn.axes
-        for indices, is_curve in ways_of(curve.mode, across, of_curve.stretch):
-            band(axis, of_curve.stretch[indices], within(low[indices], limits), within(high[indices], limits),
+        abscissa = curve.drawn_at(across)
+        for indices, is_curve in ways_of(curve.mode, across, abscissa):
+            band(axis, abscissa[indices], within(low[indices], limits), within(high[indices], limits),
                  is_path=is_curve)  # fmt: skip
-            line(axis, of_curve.stretch[indices], median[indices], is_path=is_curve)
-        points(axis, curve.abscissa, measured, is_back=curve.is_back)
+            line(axis, abscissa[indices], median[indices], is_path=is_curve)
+        points(axis, curve.drawn_at(), measured, is_back=curve.is_back)
         axis.set_ylim(limits)
         end = f" [{unit.name}]{count}"
         axis.set_title(f"{shortened(curve.name, drawn.letters - len(end))}{end}")
@@ -135,14 +136,14 @@ def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     for number, (indices, is_curve) in enumerate(described.ways):
         for shown, strength, color, label in bands:
             low, high = (within(end[indices] / unit.to_mpa, limits) for end in (shown.low, shown.high))
-            band(axis, shown.stretch[indices], low, high, color=color, strength=strength, is_path=is_curve,
+            band(axis, described.abscissa[indices], low, high, color=color, strength=strength, is_path=is_curve,
                  label="" if number else label)  # fmt: skip
         for shown, color, style, label in lines:
             median = within(shown.median[indices] / unit.to_mpa, limits)
-            line(axis, shown.stretch[indices], median, color=color, style=style, width=1.3, is_path=is_curve,
+            line(axis, described.abscissa[indices], median, color=color, style=style, width=1.3, is_path=is_curve,
                  label="" if number else label)  # fmt: skip
         rows = slice(None) if is_one else described.measured_rows[number]
-        points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
+        points(axis, curve.drawn_at()[rows], measured[rows], error=error[rows], label="" if number else "measured",
                marker=MARKERS[number % len(MARKERS)], is_back=curve.is_back[rows])  # fmt: skip
     axis.set_ylim(limits)
     cut_off(axis, limit_values[0], limit_values[1], unit.name)

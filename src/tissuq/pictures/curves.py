@@ -23,6 +23,7 @@ __all__ = [
     "Described",
     "Way",
     "described",
+    "held_along",
     "is_determined",
     "points_along",
     "rows_where_held",
@@ -34,8 +35,9 @@ FloatArray = NDArray[np.float64]
 
 POINTS, SHARE_POINTS, SHARE_DRAWS = 101, 41, 800
 """Points of a band and of a share along a curve, and draws of the latter."""
-RETURN, MOST_WAYS = 0.3, 7
-"""Decrease of the deformation at which a new path begins, over its largest change; and the most paths of a picture."""
+RETURN, JUMP, MOST_WAYS = 0.3, 5.0, 7
+"""Decrease of the deformation, or step, at which a new path begins, over its largest change; such a step over others;
+and the most paths of a picture."""
 NEARLY = 0.02
 """Changes of a control that do not count, over its range."""
 SAME_HELD = 0.01
@@ -76,6 +78,11 @@ class Described:
         return points_along(self.curve, POINTS)
 
     @property
+    def abscissa(self) -> FloatArray:
+        """What the stress at these points is drawn against, (g,)."""
+        return self.curve.drawn_at(self.points)
+
+    @property
     def measurements(self) -> Band:
         """Of new measurements, with the discrepancy."""
         return self._joint[0]
@@ -103,7 +110,7 @@ class Described:
     @cached_property
     def ways(self) -> list[Way]:
         """The paths that the points of the bands follow."""
-        return ways_of(self.curve.mode, self.points, self.stress.stretch)
+        return ways_of(self.curve.mode, self.points, self.abscissa)
 
     @cached_property
     def measured_rows(self) -> list[NDArray[np.intp]]:
@@ -111,7 +118,7 @@ class Described:
         if held := rows_where_held(self.curve.mode, self.curve.points):
             return held
         if len(self.ways) == 1:
-            return [np.argsort(self.curve.abscissa, kind="stable")]
+            return [np.argsort(self.curve.drawn_at(), kind="stable")]
         return [way.indices for way in self.ways]
 
     @cached_property
@@ -149,15 +156,16 @@ def is_determined(material: Band, stress: Band) -> bool:
 
 
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:
-    """Return the paths that points (g,) or (g, c) of a mode follow: a new one begins where a test goes back to rest.
+    """Return the paths that points (g,) or (g, c) of a mode follow: a new one begins where a test goes back or jumps.
 
     Points of a tube that was inflated at several axial stretches follow one at each of them. Each path is in the order
     of what it is drawn against. Where nothing changes along that, or there are many, it is no curve.
     """
     if points.ndim == 1:
         return [Way(np.argsort(abscissa, kind="stable"), True)]
-    size = np.linalg.norm(points - mode.reference, axis=1)
-    starts = 1 + np.flatnonzero(np.diff(size) < -RETURN * np.ptp(size))
+    size, steps = np.linalg.norm(points - mode.reference, axis=1), np.linalg.norm(np.diff(points, axis=0), axis=1)
+    jump = max(RETURN * float(np.linalg.norm(np.ptp(points, axis=0))), JUMP * float(np.median(steps)))
+    starts = 1 + np.flatnonzero((np.diff(size) < -RETURN * np.ptp(size)) | (steps > jump))
     if held := rows_where_held(mode, points):
         return [Way(rows[np.argsort(abscissa[rows], kind="stable")], True) for rows in held]
     branches = np.split(np.arange(len(points)), starts)
@@ -190,6 +198,13 @@ def rows_where_held(mode: LoadingMode, points: FloatArray) -> list[NDArray[np.in
     return groups if are_held and len(groups) <= MOST_WAYS else []
 
 
+def held_along(mode: LoadingMode, points: FloatArray) -> str:
+    """Return at which value one of several controls is held along a path, in words; nothing where none is."""
+    pairs = zip(mode.controls, np.transpose(points), strict=True) if points.ndim > 1 else ()
+    held = (f"{control.name} {column.mean():.4g}" for control, column in pairs if np.ptp(column) <= 2 * SAME_HELD)
+    return next(held, "")
+
+
 def points_along(curve: Curve, count: int) -> FloatArray:
     """Return points over the range of a curve, at each axial stretch of a tube, or its own for other controls."""
     points = curve.points
@@ -218,5 +233,5 @@ def share_along(solution: Solution, curve: Curve, prob: float = 0.95) -> tuple[l
         share = np.quantile(discrepancy / total, [0.5 * (1 - prob), 0.5, 0.5 * (1 + prob)], axis=0)
     size = np.abs(np.median(total, axis=0))
     share[:, size <= NO_STRESS * size.max()] = np.nan
-    abscissa = np.asarray(curve.path.abscissa(points))
+    abscissa = curve.drawn_at(points)
     return ways_of(curve.mode, points, abscissa), abscissa, share

@@ -133,16 +133,17 @@ def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob
     for channel, quantity in enumerate(mode.stresses):
         options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
         noisy, stress = predict_bands([(1.0, solution)], points, (True, False), **options)
+        number = mode.drawn_against(channel, points)
         predictions.append(
             Predicted(
-                abscissa=stress.stretch,
+                abscissa=points if points.ndim == 1 else points[:, number],
                 stress=stress,
                 measurements=noisy,
                 is_calibrated=is_calibrated(model, mode, points, is_directed=is_directed),
                 calibrated=None if several else calibrated_range(model, mode, is_directed=is_directed),
-                ways=ways_of(mode, points, stress.stretch),
-                measured=_measured(solution, mode, channel),
-                label=mode.abscissa_control.name,
+                ways=ways_of(mode, points, points if points.ndim == 1 else points[:, number]),
+                measured=_measured(solution, mode, channel, number),
+                label=mode.controls[number].name,
                 title=mode.name if is_joint else f"{mode.name}\n{model.material.name} alone, discrepancy unknown",
                 quantity=quantity,
             )
@@ -245,11 +246,11 @@ def curves(drawn: Panels, stretch: FloatArray, stress: FloatArray, mode: Loading
     drawn.explain()
 
 
-def _measured(solution: Solution, mode: LoadingMode, channel: int) -> Measured | None:
-    """Return what the fitted tests measured of a stress of a mode, where they did."""
+def _measured(solution: Solution, mode: LoadingMode, channel: int, control: int) -> Measured | None:
+    """Return what the fitted tests measured of a stress of a mode, where they did, against one of its controls."""
     data = solution.model.experiment
     curves = [curve for curve in data.curves if (curve.mode, curve.channel) == (mode, channel)]
     if not curves or not solution.is_of_data:
         return None
-    abscissa, stress = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("abscissa", "stress"))
-    return Measured(abscissa, stress, np.ones(len(stress), dtype=bool))
+    points, stress = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("points", "stress"))
+    return Measured(points if points.ndim == 1 else points[:, control], stress, np.ones(len(stress), dtype=bool))

@@ -16,7 +16,7 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
-from tissuq.pictures.curves import Described, is_determined, rows_where_held
+from tissuq.pictures.curves import Described, held_along, is_determined, rows_where_held
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands
 from tissuq.report.figures import described_curves
@@ -40,7 +40,10 @@ NODES, MAX_ERROR = 9, 0.01
 
 
 class _Test(NamedTuple):
-    """A stress to draw: its name, mode and channel, points (g,) along one path, and the measurements, MPa."""
+    """A stress to draw: its name, mode, channel, points (g,) or (g, c) along one path, and the measurements, MPa.
+
+    After them the number of the control that it is drawn against.
+    """
 
     name: str
     mode: LoadingMode
@@ -48,12 +51,13 @@ class _Test(NamedTuple):
     points: FloatArray
     measured_at: FloatArray
     measured: FloatArray
+    control: int = 0
     is_curve: bool = True
     is_back: NDArray[np.bool_] = np.zeros(0, dtype=bool)
 
     @property
     def abscissa(self) -> FloatArray:
-        return np.asarray(self.mode.paths[self.channel].abscissa(self.points))
+        return self.points if self.points.ndim == 1 else self.points[:, self.control]
 
 
 class _Bands(NamedTuple):
@@ -122,12 +126,12 @@ def _measured(described: Sequence[Described]) -> Iterator[_Test]:
         name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
         pairs = zip(described_curve.ways, map(_spread, described_curve.measured_rows), strict=True)
         for number, ((indices, is_curve), rows) in enumerate(pairs, 1):
-            named = f"{name}, path {number}" if len(described_curve.ways) > 1 else name
-            points = described_curve.points[_drawn(indices, is_curve)]
-            if rows_where_held(curve.mode, curve.points):
-                named = f"{name}, {curve.mode.controls[1].name} {points[0, 1]:.4g}"
-            abscissa, stress, is_back = curve.abscissa[rows], curve.stress[rows], curve.is_back[rows]
-            yield _Test(named, curve.mode, curve.channel, points, abscissa, stress, is_curve, is_back)
+            points, way = described_curve.points[_drawn(indices, is_curve)], ""
+            if len(described_curve.ways) > 1 or rows_where_held(curve.mode, curve.points):
+                way = f", {held_along(curve.mode, points) or f'path {number}'}"
+            abscissa, stress, is_back = curve.drawn_at()[rows], curve.stress[rows], curve.is_back[rows]
+            yield _Test(f"{name}{way}", curve.mode, curve.channel, points, abscissa, stress, curve.drawn_against,
+                        is_curve, is_back)  # fmt: skip
 
 
 def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -207,7 +211,7 @@ def _test(test: _Test, basis: FloatArray, unit: StressUnit) -> dict[str, Any]:
     """Return a test as the page has it, with its basis (nodes, columns, g) and measurements in a unit."""
     return {
         "name": test.name,
-        "control": test.mode.controls[0].name,
+        "control": test.mode.controls[test.control].name,
         "is_curve": test.is_curve,
         "x": _rounded(test.abscissa),
         "measured_at": _rounded(test.measured_at),

@@ -88,28 +88,28 @@ def predictive_figure(
                 low, high, median = (
                     band_values[indices] / unit.to_mpa for band_values in (of_panel.low, of_panel.high, of_panel.median)
                 )
-                band(axis, of_panel.stretch[indices], low, high, is_path=is_curve, label="95 % predictive band")
-                line(axis, of_panel.stretch[indices], median, is_path=is_curve, label="predicted median")
+                band(axis, of_curve.abscissa[indices], low, high, is_path=is_curve, label="95 % predictive band")
+                line(axis, of_curve.abscissa[indices], median, is_path=is_curve, label="predicted median")
                 if name != "none" and base:
                     none = base[index % len(curves)]
-                    line(axis, none.stretch[indices], none.median[indices] / unit.to_mpa, color=BASE, style=":",
+                    line(axis, of_curve.abscissa[indices], none.median[indices] / unit.to_mpa, color=BASE, style=":",
                          width=1.4, is_path=is_curve, label="median of the fit 'none'")  # fmt: skip
             if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
                 ends = float(of_panel.stretch[0]), float(of_panel.stretch[-1])
                 shade_instability(axis, posterior.stable_ranges.get(curve.mode.name), *ends)
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
-            points(axis, curve.abscissa, curve.stress / unit.to_mpa, is_back=curve.is_back)
+            points(axis, curve.drawn_at(), curve.stress / unit.to_mpa, is_back=curve.is_back)
             axis.locator_params(axis="x", nbins=6)
             if len(curves) > 1:
-                axis.set_xlabel(curve.abscissa_name, fontsize=9)
+                axis.set_xlabel(curve.drawn_name, fontsize=9)
         if len(curves) == 1:
             shown = [end / unit.to_mpa for of_panel in bands for end in (of_panel.low, of_panel.high)]
             for number, axis in enumerate(drawn.axes):  # numbers beneath the lowest panel of a column alone
                 axis.sharex(drawn.axes[0]) if number else None
                 axis.set_ylim(limits_of([curves[0].stress / unit.to_mpa, *shown], []))
                 axis.tick_params(labelbottom=number + columns >= len(drawn.axes))
-            figure.supxlabel(curves[0].abscissa_name, fontsize=10.5)
+            figure.supxlabel(curves[0].drawn_name, fontsize=10.5)
         measured = {stress for curve in curves for stress in curve.mode.stresses}
         quantity = measured.pop() if len(measured) == 1 else "engineering stress"
         figure.supylabel(f"{quantity} [{unit.name}]", fontsize=10.5)

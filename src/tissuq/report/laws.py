@@ -208,16 +208,16 @@ def curve_figure(study: LawStudy) -> Figure:
     with new_figure(8.2, (4.2 if len(curves) == 1 else 3.4) * -(-len(curves) // columns) + 0.7) as figure:
         axes = on_figure(figure, len(curves), columns).axes
         for axis, curve in zip(axes, curves, strict=True):
-            pieces.points(axis, curve.abscissa, curve.stress / scale, color=BASE, is_back=curve.is_back)
+            pieces.points(axis, curve.drawn_at(), curve.stress / scale, color=BASE, is_back=curve.is_back)
             points = points_along(curve, LINE_POINTS)
             states = curve.path.at(points)
             for number, name in enumerate(names):
                 stress = study.comparison.alone[name].stress(states)
-                for indices, is_curve in ways_of(curve.mode, points, states.abscissa):
-                    pieces.line(axis, states.abscissa[indices], stress[indices] / scale, color=SERIES[number],
+                for indices, is_curve in ways_of(curve.mode, points, curve.drawn_at(points)):
+                    pieces.line(axis, curve.drawn_at(points)[indices], stress[indices] / scale, color=SERIES[number],
                                 width=1.2, is_path=is_curve, label=name)  # fmt: skip
             axis.set_title(curve.name)
-            axis.set_xlabel(curve.mode.controls[0].name)
+            axis.set_xlabel(curve.drawn_name)
             axis.set_ylabel(f"engineering stress [{study.unit.name}]")
         legend_above(figure, axes, 4)
     return figure

@@ -40,6 +40,8 @@ class Control:
 
 
 STRETCH = Control("stretch")
+HELD = 0.1
+"""Step of a control from one measurement to the next, over those of another one, below which it is held."""
 SHEAR = Control("amount of shear", reference=0.0, above=-inf)
 
 
@@ -125,6 +127,18 @@ class LoadingMode(ABC):
     def abscissa_control(self) -> Control:
         """What stresses are drawn against: the first control, or where there are several stresses a stretch of each."""
         return self.controls[0] if 1 in (len(self.controls), len(self.stresses)) else STRETCH
+
+    def drawn_against(self, channel: int, points: ArrayLike) -> int:
+        """Return the number of the control that a stress at points (n,) or (n, c) is drawn against.
+
+        That along whose axis it acts; where this one is held and another one changes, the latter.
+        """
+        columns, probe = np.atleast_2d(np.transpose(points)), np.atleast_1d(self.excursion(0.1))
+        own = np.flatnonzero(probe == self.paths[channel].abscissa(self.excursion(0.1)))
+        steps = np.median(np.abs(np.diff(columns, axis=1)), axis=1) if columns.shape[1] > 1 else np.zeros(len(columns))
+        if len(own) and steps[own[0]] >= HELD * steps.max():
+            return int(own[0])
+        return int(np.argmax(steps))
 
     @property
     def reference(self) -> Any:
