@@ -287,7 +287,8 @@ def draw_prediction(axes: Sequence[Axes], prediction: Prediction) -> None:
 
 def _shown(prediction: Prediction, channel: int, kind: bool) -> Predicted:
     """Return what is drawn of a stress, with the discrepancy or without."""
-    number, abscissa = _abscissa(prediction)
+    number = prediction.mode.drawn_against(channel, prediction.points)
+    abscissa = list(prediction.controls.values())[number]
     measured = None
     if prediction.data is not None:
         points = prediction.data.stretch if prediction.points.ndim == 1 else abscissa
@@ -304,13 +305,6 @@ def _shown(prediction: Prediction, channel: int, kind: bool) -> Predicted:
         title=_title(prediction, channel, kind),
         quantity=prediction.stresses[channel],
     )
-
-
-def _abscissa(prediction: Prediction) -> tuple[int, FloatArray]:
-    """Return the first control that changes, its number and its values."""
-    columns = list(prediction.controls.values())
-    number = next((index for index, column in enumerate(columns) if np.ptp(column) > 0), 0)
-    return number, columns[number]
 
 
 def _label(prediction: Prediction, number: int) -> str:
