@@ -185,7 +185,9 @@ def test_fibres_are_fitted_with_a_matrix_and_not_without():
     with pytest.raises(tq.ModelError, match="the criteria are those of isotropic materials"):
         posterior.stability()
     with pytest.raises(tq.ModelError, match="only of an isotropic material"):
-        posterior.predict([1.1], mode="uniaxial")
+        posterior.predict([1.1], mode="equibiaxial")
+    (true,) = tq.simulate("holzapfel-gasser-ogden", truth, [1.1], 0.0, mode="uniaxial").stress
+    assert posterior.predict([1.1], mode="uniaxial")["median"].iloc[0] == pytest.approx(true, abs=2e-4)
     assert posterior.assess().stable == {}
     with pytest.raises(tq.ModelError, match=r"fibres only.*add a matrix, as in 'neo-hookean.exponential-fibres'"):
         tq.fit(data, material="exponential-fibres")
@@ -219,7 +221,7 @@ def test_several_tests_of_fibres_are_fitted_together_where_each_prescribes_the_d
     for symbol, value in truth.items():
         assert abs(summary.loc[symbol, "mean"] - value) < 4 * summary.loc[symbol, "sd"], symbol
     with pytest.raises(tq.ModelError, match="only of an isotropic material"):
-        posterior.predict([1.1], mode="uniaxial")
+        posterior.predict([1.1], mode="equibiaxial")
     pulled = tq.simulate("neo-hookean", {"C10": 0.01}, np.linspace(0.8, 1.3, 8), 2e-4, seed=3, mode="equibiaxial")
     with pytest.raises(tq.ModelError, match="only of an isotropic material"):
         tq.fit([sheared, pulled], material=law, **options)

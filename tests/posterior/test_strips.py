@@ -7,7 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 import tissuq as tq
+from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics import material_named
+from tissuq.prediction.stress import Stress
 
 STRETCH, NOISE = np.linspace(1.05, 1.4, 8), 5e-4
 TRUTH = {"C10": 0.01, "k": 0.05}
@@ -103,12 +105,60 @@ def test_an_error_of_the_stress_goes_with_them(strips):
         assert row["low"] < TRUTH["C10"] * pulled(stretch, 2, 5.0) < row["high"]
 
 
-def test_a_fit_of_two_stresses_does_not_predict_what_depends_on_the_ratio():
+@pytest.fixture(scope="module")
+def sheet():
     stretch = [[1 + a * t, 1 + b * t] for a, b in ((1, 1), (1, 0.5), (0.5, 1)) for t in np.linspace(0.05, 0.3, 4)]
-    data = tq.simulate(LAW, TRUTH, stretch, 1e-3, seed=1, mode="biaxial")
-    posterior = tq.fit(data, material=LAW, discrepancy="none", noise_sd=1e-3)
+    return tq.simulate(LAW, TRUTH, stretch, 2e-3, seed=1, mode="biaxial")
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_fit_of_two_stresses_predicts_strips_by_the_lateral_stretch_of_every_draw(sheet, axis):
+    """Against the closed form at draws of the Gaussian posterior of two linear parameters."""
+    posterior = tq.fit(sheet, material=LAW, discrepancy="none", noise_sd=2e-3)
     assert list(posterior.model.symbols) == ["C10", "k"]
-    with pytest.raises(tq.ModelError, match="predicted by a fit that holds one"):
+    at = [1.0, 1.1, 1.3]
+    design = posterior.model.design
+    covariance = 2e-3**2 * np.linalg.inv(design.T @ design)
+    mean = covariance @ design.T @ posterior.model.stress / 2e-3**2
+    draws = np.random.default_rng(5).multivariate_normal(mean, covariance, 4000)
+    assert (draws > 0).all()
+    stress = np.array([[C10 * pulled(x, axis, k / C10) for x in at] for C10, k in draws])
+    spread = stress.std(axis=0)
+    assert spread[1] > 0.01 * stress.mean(axis=0)[1]
+    band = posterior.predict(at, mode=f"uniaxial@{axis}", noise=False)
+    for name, probability in (("low", 0.025), ("median", 0.5), ("high", 0.975)):
+        expected = np.quantile(stress, probability, axis=0)
+        np.testing.assert_allclose(band[name], expected, rtol=0, atol=0.12 * spread.max())
+        assert np.abs(band[name] - expected)[1:].max() < 0.12 * spread[1:].max()
+    noisy = posterior.predict(at, mode=f"uniaxial@{axis}")
+    np.testing.assert_allclose(noisy["high"] - noisy["low"], 2 * 1.96 * np.hypot(spread, 2e-3), rtol=0.05)
+
+
+def test_the_slopes_of_a_predicted_strip_are_those_of_its_draws(sheet):
+    """By which slack and errors of the length add to the band of a new test."""
+    posterior = tq.fit(sheet, material=LAW, discrepancy="none", noise_sd=2e-3)
+    stress = Stress(posterior.model, posterior.solution.mixture.thinned(4), True)
+    states = posterior.model.experiment.states_at(np.array([1.2]), loading_mode("uniaxial"), 0)
+    drawn, mean, _ = stress.at(states)
+    slopes = stress.slopes(states, mean)[:, 0, 0]
+    for number in (0, 50, 700):
+        C10, k = drawn.mean[number]
+        ends = [C10 * pulled(1.2 + step, 1, k / C10) for step in (-1e-5, 1e-5)]
+        assert mean[number, 0] == pytest.approx(np.mean(ends), rel=1e-7)
+        assert slopes[number] == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-3)
+
+
+def test_a_fit_with_a_further_energy_does_not_predict_strips(sheet):
+    posterior = tq.fit(sheet, material=LAW, discrepancy="yeoh", noise_sd=2e-3)
+    with pytest.raises(tq.ModelError, match="would depend on the discrepancy 'yeoh', too"):
+        posterior.predict([1.1], mode="uniaxial")
+    assert posterior.predict([1.1], mode="uniaxial", discrepancy=False)["median"].iloc[0] > 0
+
+
+def test_a_fit_of_two_stresses_whose_fibres_shear_does_not_predict_strips(sheet):
+    law = LAW.replace("@40", ":one@40")
+    posterior = tq.fit(sheet, material=law, discrepancy="none", noise_sd=2e-3)
+    with pytest.raises(tq.ModelError, match="as one at an angle shears, too"):
         posterior.predict([1.1], mode="uniaxial")
 
 

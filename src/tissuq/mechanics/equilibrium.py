@@ -13,7 +13,7 @@ from tissuq.experiments.modes.path import STEP
 from tissuq.mechanics.arithmetic import exp, library, log, sqrt
 from tissuq.mechanics.material import Material
 
-__all__ = ["energy_in_equilibrium", "has_free_axis", "in_equilibrium"]
+__all__ = ["energy_in_equilibrium", "has_free_axis", "in_equilibrium", "why_no_equilibrium"]
 
 WIDEST = 4.0
 """Largest distance of the logarithm of the lateral stretch from that of an isotropic material."""
@@ -37,6 +37,12 @@ def has_free_axis(material: Material, states: States) -> bool:
         return False
     moved = (path.moved(points[:1], 0.0) for path, points in zip(states.paths, states.points, strict=True))
     return any(deformation.plane[axis] is None for deformation in moved for axis in material.felt_axes)
+
+
+def why_no_equilibrium(material: Material, deformation: Deformation) -> str:
+    """Return why a material does not deform as a test says that leaves an axis to it; an empty text where it does."""
+    problem = material.why_not(deformation)
+    return "" if deformation.has_free_axis and not material.shears and not material.needs_matrix else problem
 
 
 def in_equilibrium(material: Material, deformation: Deformation, values: Any) -> Deformation:

@@ -8,11 +8,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.mechanics.equilibrium import has_free_axis
 from tissuq.mechanics.rays import Range, drawn_back, share_to_end
+from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import STRETCH_STEP, drawn_stress, stress_moments, stress_slopes, stresses_beyond
+from tissuq.prediction.moments import (
+    STRETCH_STEP,
+    drawn_stress,
+    stress_moments,
+    stress_slopes,
+    stresses_beyond,
+    values_of,
+)
 
 __all__ = ["Stress"]
 
@@ -47,8 +57,12 @@ class Stress:
     def at(self, states: States) -> tuple[GaussianMixture, FloatArray, FloatArray]:
         """Return components (M,) with means and variances (M, g) of the stress at states (g,).
 
-        They are more than those of the posterior where some of the states lie beyond its range.
+        They are more than those of the posterior where some of the states lie beyond its range, or have a lateral
+        stretch that depends on the ratio of several linear parameters: it is found for every draw.
         """
+        if self._follows_draws(states):
+            drawn, _ = self._drawn
+            return drawn, self._in_equilibrium(states), np.zeros((len(drawn), len(states)))
         logs, tilt = states.log_stretches[0], states.tilt[0]
         shares = np.array([share_to_end(logs, limits, tilt) for limits in self._limits or [Range()]])
         farthest = shares.max(axis=0)
@@ -64,6 +78,9 @@ class Stress:
 
     def slopes(self, states: States, mean: FloatArray) -> FloatArray:
         """Return the slopes (M, g, c) of the means (M, g) along the controls of their paths, MPa; zero beyond these."""
+        if self._follows_draws(states):
+            moved = (self._in_equilibrium(states.displaced(n, STRETCH_STEP)) for n in range(states.controls))
+            return (np.stack(list(moved), axis=-1) - mean[:, :, None]) / STRETCH_STEP
         if len(mean) == len(self.components):
             return stress_slopes(self.model, self.components, states, mean, discrepancy=self.with_discrepancy)
         displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
@@ -71,6 +88,31 @@ class Stress:
             drawn_stress(self.model, self._drawn[0], shifted, self._drawn[1]) for shifted in (states, *displaced)
         )
         return (np.stack(stresses, axis=-1) - undisplaced[:, :, None]) / STRETCH_STEP
+
+    def _follows_draws(self, states: States) -> bool:
+        """Return whether the stress is linear in no parameters, as the material finds its lateral stretch by them."""
+        return self.model.material.linear_mask.sum() > 1 and has_free_axis(self.model.material, states)
+
+    def _in_equilibrium(self, states: States) -> FloatArray:
+        """Return the stresses (M, g) of the material's draws where no lateral stress acts.
+
+        Raises
+        ------
+        ModelError
+            When draws have parameters that they must not have, so that there may be no lateral stretch of least energy,
+            or no stress.
+        """
+        material = self.model.material
+        values, _ = values_of(self.model, self._drawn[0], self.model.material_symbols)
+        stress = stresses_by_basis(material, states, values)
+        least = [parameter.support[0] for parameter in material.parameters]
+        if (values < least).any() or not np.isfinite(stress).all():
+            symbols = ", ".join(self.model.material_symbols)
+            raise ModelError(
+                f"material '{material.name}' has no lateral stretch with some of the values of {symbols} that the data "
+                "allow: give priors of positive stiffnesses (--prior), or predict at smaller stretches."
+            )
+        return stress
 
     @cached_property
     def _limits(self) -> list[Range]:

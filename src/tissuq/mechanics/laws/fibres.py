@@ -106,9 +106,9 @@ class FibreMaterial(Material):
         return (
             f"material '{self.name}' has fibres, and this loading mode says how the specimen deforms only of an "
             "isotropic material: give both stresses of 'biaxial' instead of 'equibiaxial'. In 'uniaxial' the lateral "
-            "stretch depends on the stiffness of the fibres over that of their matrix: such a test is fitted, and "
-            "predicted by a fit that holds one, for two families in a matrix of one stiffness, such as neo-hookean, or "
-            "for one family along an axis (:one@0, :one@90), as one at an angle shears, too."
+            "stretch depends on the stiffness of the fibres over that of their matrix: such a test is predicted for "
+            "two families, or one along an axis (:one@0, :one@90), as one at an angle shears, too; and fitted where "
+            "the matrix has one stiffness, as neo-hookean."
         )
 
     @property
