@@ -250,7 +250,7 @@ def _calibrated_in_words(posterior: Posterior, mode: LoadingMode) -> str:
     """Return up to which states was measured."""
     if ends := range_of(posterior, mode):
         low, high = ends
-        if low == high:
+        if np.isclose(low, high):
             return f"in mode {mode.name} a stretch along an axis of the test was not measured, and it has a direction"
         return f"in mode {mode.name} the run is calibrated from {low:.4g} to {high:.4g} ({mode.controls[0].name})"
     states = measured_states(posterior.model, is_directed=posterior.solution.is_directed)
