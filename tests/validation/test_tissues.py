@@ -149,10 +149,10 @@ def test_verdicts_are_set_against_what_came_true():
     ]  # fmt: skip
     columns = ["quantity", "verdict", "predictions", "held", "error", "precise", "of_use"]
     assert summarise_verdicts(results)[columns].to_numpy().tolist() == [
-        ["modulus", "with care", 2, 0.5, pytest.approx(0.5), 0.5, 0.5],
-        ["modulus", "no", 1, 1.0, pytest.approx(0.2), 1.0, 1.0],
         ["stress", "yes", 2, 0.9, 0.2, 0.5, 1.0],
         ["stress", "no", 1, 0.9, 2.0, 0.0, 0.0],
+        ["modulus", "with care", 2, 0.5, pytest.approx(0.5), 0.5, 0.5],
+        ["modulus", "no", 1, 1.0, pytest.approx(0.2), 1.0, 1.0],
     ]
     assert summarise_verdicts(results[-2:]).empty
 

@@ -132,7 +132,7 @@ def _verdicts(summary: pd.DataFrame) -> tuple[Section, ...]:
     """Return how far predictions were off, by what the fit said that it could be used for."""
     if summary.empty:
         return ()
-    limits = [f"off by at most {100 * limit:g} %" for limit in (PRECISE, USEFUL)]
+    limits = [f"within {100 * limit:g} %" for limit in (PRECISE, USEFUL)]
     rows = [
         [
             f"{row['quantity']}: {TESTS[row['protocol']].lower()}",
@@ -145,7 +145,7 @@ def _verdicts(summary: pd.DataFrame) -> tuple[Section, ...]:
         f"A fit says 'yes' where it claims to know a stress or a modulus to {100 * PRECISE:g} %, and 'with care' up to "
         f"{100 * USEFUL:g} % or where something speaks against it. Of the predictions under a verdict: the mean share "
         "of the measurements (or of the moduli of the predicted tests) in 95 % intervals, the median error, and how "
-        "many were off by no more than such claims."
+        "many were within what a verdict of yes claims, and within what one of care does."
     )
     table = Table(["predicted", "formulation", "verdict", "predictions", "in 95 %", "error", *limits], rows, "", (1, 2))
     return (Section("Do the verdicts hold?", (text, table)),)

@@ -364,7 +364,7 @@ def summarise_verdicts(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
         error=(table["modulus_mean"] / modulus - 1).abs(),
     )
     rows = pd.concat([table.assign(quantity="stress", held=table["inside_95"]), of_modulus]).dropna(subset="verdict")
-    for name, order in (("protocol", PROTOCOLS), ("verdict", tuple(Verdict))):
+    for name, order in (("quantity", ("stress", "modulus")), ("protocol", PROTOCOLS), ("verdict", tuple(Verdict))):
         rows[name] = pd.Categorical(rows[name], list(order))
     rows["precise"], rows["of_use"] = ((rows["error"] <= limit).astype(float) for limit in (PRECISE, USEFUL))
     groups = rows.groupby(["quantity", "protocol", "formulation", "verdict"], observed=True)
