@@ -63,8 +63,8 @@ SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|
 """Words for a measure that no noun need follow."""
 SYMBOL_AFTER = re.compile(r" [abdhls]_?[0o]$")
 """That of a size in standards, after its name."""
-MEASURED_ALONG = re.compile(r"(?<=messlange) (?P<way>.+)")
-"""What is measured along a gauge length, as in ``Messlänge Standardweg``."""
+MEASURED_ALONG = re.compile(r"(?:(?<=messlange)|(?<=gage length)|(?<=gauge length)|(?<=\bl0)),? (?P<way>.+)")
+"""What is measured along a gauge length, as in ``Messlänge Standardweg`` and ``L0 - course standard``."""
 
 
 ROLES_AND_SIZES = frozenset(["size"]).union(*(names for role, names in ROLES.items() if role not in ROLES_OF_TUBE))
@@ -205,7 +205,8 @@ def contents_of(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, s
     quantities = [without_correction(quantity) for quantity in stated]
     corrected = {name for name, quantity in zip(quantities, stated, strict=True) if name != quantity}
     for column, (name, unit) in enumerate(zip(quantities, units, strict=True)):
-        if stated[column] in corrected:
+        is_share_of_length = name in ROLES["length"] and measured_in(unit) == "strain"
+        if stated[column] in corrected or is_share_of_length:
             quantities[column] = ""
         elif DEFORMATION_GRADIENT.fullmatch(name) and (not unit or measured_in(unit) == "strain"):
             quantities[column] = DEFORMATION_GRADIENT.sub(r"stretch \1", name)
