@@ -141,6 +141,28 @@ def test_pure_shear_is_planar(tmp_path, name):
             "--tension-positive",
             {"dimensions": SIZES, "compression_positive": False},
         ),
+        ("rubber_PS.csv", "Stretch,Stress (kPa)", (L, P), "--mode uniaxial, or another", {"mode": "uniaxial"}),
+        (
+            "of_area_1.csv",
+            "Strain,Force (kN),Stress (MPa)",
+            (L - 1, 1e-3 * N, N),
+            '--column force="Force (kN)", and the --area',
+            {"dimensions": {"area": "4 mm2"}, "columns": {"force": "Force (kN)"}},
+        ),
+        (
+            "membrane.csv",
+            "Pressure (kPa),Stretch,Stress (kPa)",
+            (L - 1, L, P),
+            "--mode uniaxial",
+            {"mode": "uniaxial"},
+        ),
+        (
+            "two_strains.csv",
+            "Strain_x,Lambda_x,Stress_x (kPa)",
+            (100 * (L - 1), L, P),
+            "may be the strain or stretch: 'Strain_x' (number 1) and 'Lambda_x' (number 2)",
+            {"columns": {"stretch": "Lambda_x"}},
+        ),
         ("percent.csv", "Stretch (%),Stress (kPa)", (100 * (L - 1), P), "strain=", {"columns": {"strain": 1}}),
         ("weight.csv", "Displacement (mm),Load (g)", (D, N / 9.80665e-3), "force_unit gf", {"force_unit": "gf"}),
     ],
@@ -153,6 +175,25 @@ def test_what_is_open_is_asked_about_and_the_advice_reads_it(tmp_path, name, hea
         tq.read_tests(path, **sizes)
     assert words.replace("force_unit", "--force-unit") in str(refusal.value)
     check(path, **(sizes | options))
+
+
+def test_a_height_in_percent_is_no_length(tmp_path):
+    path = written(tmp_path, "test.csv", "Height (mm),Height (%),Stress (kPa)", 10 * L, 100 * L, P)
+    check(path, length="10 mm")
+
+
+@pytest.mark.parametrize("mode", ["simple-shear", "uniaxial"])
+def test_columns_without_names_are_asked_for_in_roles_that_the_mode_has(tmp_path, mode):
+    path = tmp_path / "test.csv"
+    path.write_text("".join(f"{k},{strain:.8g}\n" for k, strain in enumerate(L - 1)))
+    role = "shear" if mode == "simple-shear" else "stretch"
+    with pytest.raises(InputError, match=rf"--column {role}=1 --column stress=2"):
+        tq.read(path, mode=mode)
+
+
+def test_an_area_of_1_mm2_that_is_meant_is_read_as_stated(tmp_path):
+    path = written(tmp_path, "test.csv", "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
+    check(path, columns={"strain": 1, "stress": "Stress (MPa)"})
 
 
 def test_compression_that_is_named_is_not_read_as_tension(tmp_path):

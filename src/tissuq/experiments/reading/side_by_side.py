@@ -16,10 +16,12 @@ from tissuq.experiments.reading.headings import (
     measure_in,
     of_spread,
     on_lettered_axis,
+    plain,
     without_mean,
 )
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
+from tissuq.experiments.reading.stated_mode import is_named_by_mode
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES, other_quantity
 from tissuq.experiments.units import measured_in
@@ -30,6 +32,10 @@ PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer
 """Words and capacities that tell one load cell from another, and not tests."""
 BETWEEN_WORDS = re.compile(r"\s+|(?<=\w)\.(?=[^\W\d]{2})")
 """Blanks, or the points of R, as in ``S1.strain``."""
+OF_WAY = re.compile(rf"\(({'|'.join(map(re.escape, sorted(ROLES['displacement'])))})\)")
+"""Over which displacement a strain was measured, as in ``Compressive strain (Extension) 1``."""
+CLOCK = re.compile(r"(time|zeit|temps|tiempo|tempo|czas|время|时间|時間|시간) ?(?P<test>[^\W_]+)")
+"""Name of the time of one test among several."""
 TENSOR = frozenset(["11", "22", "33", "12", "13", "23", "21", "31", "32"])
 """Components, which are not numbers of tests."""
 LETTERS_OF_STRESS = "spt "
@@ -75,6 +81,7 @@ def columns_side_by_side(table: Table, mode: LoadingMode, options: ReadingOption
     They are a stress or force for each test, and a deformation for each or one for all. Their names are the same, or
     differ in the number, letter or name of a specimen; the names of the tests may stand in the line above. Columns of
     loads that are known by their units alone are of specimens, or means of groups, beside one deformation of all.
+    Numbers 1 and 2 are those of axes, unless the time is numbered, too.
     """
     deformations = ("shear",) if mode.controls == (SHEAR,) else LENGTHENINGS
     roles = [_role(name, (*deformations, *LOADS), options.get("stress_type")) for name in table.quantities]
@@ -85,7 +92,9 @@ def columns_side_by_side(table: Table, mode: LoadingMode, options: ReadingOption
     load, loads = _columns_of_first(LOADS, roles)
     labels = [roles[column].test for column in loads]
     numbers_of_tests = {label.lstrip(LETTERS_OF_STRESS) if is_by_unit else label for label in labels}
+    clocks = {clock["test"] for clock in map(CLOCK.fullmatch, table.quantities) if clock}
     is_of_axes = numbers_of_tests <= AXES.keys() and not any(map(is_of_mean, table.quantities))
+    is_of_axes = is_of_axes and not numbers_of_tests <= clocks  # both axes of a machine have one time
     if len(loads) < 2 or not measures or numbers_of_tests <= TENSOR or is_of_axes:
         return []
     is_named = len(set(labels)) == len(labels) and all(labels)
@@ -145,7 +154,7 @@ def _role(quantity: str, roles: Sequence[str], stress_type: str | None) -> _Role
     """Return which of some roles a column has by its name, and the test that the name tells."""
     if on_lettered_axis(quantity)[0]:
         return _Role("", "")
-    for words, test in _parts(quantity):
+    for words, test in _parts(plain(OF_WAY.sub(" ", quantity))):
         quantity_alone, measure = measure_in(words)
         for role in roles:
             wanted = stress_type if role == "stress" else None
@@ -175,10 +184,10 @@ def _parts(quantity: str) -> Iterator[tuple[str, str]]:
 
 
 def _is_test(text: str) -> bool:
-    """Tell whether a part of a name is the number, the letter or the name of a specimen."""
+    """Tell whether a part of a name is the number, the letter or the name of a specimen, or its loading mode."""
     words = text.split()
     return (
         bool(words)
         and not PART_OF_MACHINE.search(text)
-        and (len(words[-1]) == 1 or any(map(str.isdigit, text)) or is_of_specimens(words[0]))
+        and (len(words[-1]) == 1 or any(map(str.isdigit, text)) or is_of_specimens(words[0]) or is_named_by_mode(text))
     )
