@@ -57,6 +57,8 @@ CORRECTED = re.compile(
 """Words beside the name of what was corrected."""
 DIRECTION_IN_BRACKETS = re.compile(r"\s*[\[(](compress\w*|tens\w*|druck|zug)[\])]", re.IGNORECASE)
 """Of a load, as in ``Strain (compression) [%]``: it tells the sign alone."""
+PERCENT_BEFORE = re.compile(r"^\s*%\s*([^\W\d_][^%\[(]*)$")
+"""The unit before a name, as in ``% Strain``; no other one follows it."""
 LINK = re.compile(r"\(\)|\b(de|di|of|nach|selon|according to)\b")
 """What may stand between such a word and the noun."""
 SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
@@ -133,7 +135,7 @@ class Heading:
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = DIRECTION_IN_BRACKETS.sub("", CHANNEL.sub("", name))
+    name = PERCENT_BEFORE.sub(r"\1 (%)", DIRECTION_IN_BRACKETS.sub("", CHANNEL.sub("", name)))
     if formula := FORMULA.fullmatch(name.strip()):
         quantity = FORMULAS.get(re.sub(r"[\s_]", "", formula["quantity"]).lower())
         if quantity:

@@ -43,9 +43,10 @@ OTHER_QUANTITIES = {
     "a strength": r"strength|festigkeit|résistance|resistencia|resistenza|прочност|强度|強度|wytrzymałoś",
     "a stress or strain at yield": r"yield|streckgrenze|dehngrenze|fließ|текучест|屈服|降伏",
     "a largest value, and no curve": r"\bpeak\b|\bultimate\b|\bmaximum\b|\bmaximal\b|\bmax\b",
+    "a smallest value, and no curve": r"\bminimum\b|\bminimal\b|\bmin\b",
     "a value at failure, and no curve": r"\b(fracture|failure|rupture|break(ing)?)\b|bruch",
     "a range or a difference": r"\brange\b|difference|differenz|invariant",
-    "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|theor|berechnet",
+    "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|\bsim\b|\bfe[am]\b|theor|berechnet",
     "a load before the test": r"\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
     "an amplitude, and no curve": r"amplitud|амплитуд|振幅",
     "what was asked of the machine, and not measured": r"set ?point|command|demand|sollwert",
@@ -96,7 +97,8 @@ def names_of(text: str) -> frozenset[str]:
 
 ROLES = {
     "stretch": names_of(
-        "stretch, stretch ratio, extension ratio, lambda, λ, streckung, étirement, estiramiento, stiramento, "
+        "stretch, stretch ratio, extension ratio, elongation ratio, draw ratio, "
+        "lambda, λ, streckung, étirement, estiramiento, stiramento, "
         "степень растяжения, степень удлинения, кратность растяжения, кратность удлинения, коэффициент растяжения, "
         "拉伸比, 伸长比, 伸張比"
     ),
@@ -143,6 +145,7 @@ ROLES = {
     ),
     "length": names_of(
         "marker distance, marker separation, distance between markers, distance of markers, markerabstand, "
+        "grip distance, grip separation, grip to grip separation, distance between grips, clamp distance, "
         "distance entre marqueurs, distancia entre marcadores, 标记间距, gap, gap width, gap height, height, "
         "sample height, specimen height, current length, current height, spalt, "
         "spaltweite, höhe, probenhöhe, зазор, высота, высота образца, текущая длина, текущая высота, 间隙, 間隙, すき間"
