@@ -52,6 +52,7 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
     "head",
     [
         "AxialDisplacement(mm),ForceN",
+        "displacement_mm,force_n",
         "Position(Linear:Position) (mm),Load(Linear:Load) (N)",
         "Spostamento [mm],Forza [N]",
         "変位(mm),荷重(N)",

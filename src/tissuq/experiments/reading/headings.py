@@ -59,6 +59,9 @@ DIRECTION_IN_BRACKETS = re.compile(r"\s*[\[(](compress\w*|tens\w*|druck|zug)[\])
 """Of a load, as in ``Strain (compression) [%]``: it tells the sign alone."""
 PERCENT_BEFORE = re.compile(r"^\s*%\s*([^\W\d_][^%\[(]*)$")
 """The unit before a name, as in ``% Strain``; no other one follows it."""
+NEWTONS = {"n": "N", "kn": "kN", "mn": "mN"}
+FORCE_IN_SMALL_LETTERS = re.compile(rf"(?P<quantity>([a-z]+_)*(force|load))_(?P<unit>{'|'.join(NEWTONS)})")
+"""With its unit, as programs write names of columns: ``force_n``."""
 LINK = re.compile(r"\(\)|\b(de|di|of|nach|selon|according to)\b")
 """What may stand between such a word and the noun."""
 SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
@@ -135,6 +138,8 @@ class Heading:
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
+    if force := FORCE_IN_SMALL_LETTERS.fullmatch(name.strip()):
+        return Heading(plain(force["quantity"]), NEWTONS[force["unit"]])
     name = PERCENT_BEFORE.sub(r"\1 (%)", DIRECTION_IN_BRACKETS.sub("", CHANNEL.sub("", name)))
     if formula := FORMULA.fullmatch(name.strip()):
         quantity = FORMULAS.get(re.sub(r"[\s_]", "", formula["quantity"]).lower())
