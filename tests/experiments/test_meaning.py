@@ -53,6 +53,7 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
     [
         "AxialDisplacement(mm),ForceN",
         "displacement_mm,force_n",
+        "Cross Head Travel (mm),Load (N)",
         "Position(Linear:Position) (mm),Load(Linear:Load) (N)",
         "Spostamento [mm],Forza [N]",
         "変位(mm),荷重(N)",

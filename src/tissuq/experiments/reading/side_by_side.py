@@ -97,7 +97,8 @@ def columns_side_by_side(table: Table, mode: LoadingMode, options: ReadingOption
     is_of_axes = is_of_axes and not numbers_of_tests <= clocks  # both axes of a machine have one time
     if len(loads) < 2 or not measures or numbers_of_tests <= TENSOR or is_of_axes:
         return []
-    is_named = len(set(labels)) == len(labels) and all(labels)
+    are_of_modes = {is_named_by_mode(label) for label in labels}
+    is_named = len(set(labels)) == len(labels) and all(labels) and len(are_of_modes) == 1
     if is_named and (by_label := {roles[column].test: column for column in measures}).keys() == set(labels):
         pairs = [(by_label[label], column) for label, column in zip(labels, loads, strict=True)]
     elif len(measures) == 1 and (is_named or (not any(labels) and names_above(table, loads))):

@@ -235,7 +235,7 @@ def check_not_inflated(table: Table, stress: int) -> None:
         if column == stress or quantity not in ROLES["pressure"] or not table.varies(column):
             continue
         pressures, stresses = table.without_missing([column, stress]).numbers([column, stress])
-        rises = np.ptp(pressures) > PRESSURE_RISES * np.abs(pressures).max()
+        rises = np.ptp(pressures) > PRESSURE_RISES * np.abs(pressures).max() and np.ptp(stresses) > 0
         if rises and np.corrcoef(pressures, stresses)[0, 1] > RISES_WITH:
             raise InputError(
                 f"{table.place(stress)} rises with the pressure {table.label(column)}: if that stretched the specimen, "
