@@ -197,6 +197,14 @@ def test_columns_without_names_are_asked_for_in_roles_that_the_mode_has(tmp_path
         tq.read(path, mode=mode)
 
 
+def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_reads_it(tmp_path):
+    path = written(tmp_path, "shear_1.csv", "Shear,Stress (kPa)", L, P)
+    with pytest.raises(InputError, match=r"If 1 was added to it, take that off; .* --mode planar"):
+        tq.read(path)
+    check(written(tmp_path, "shear_2.csv", "Shear,Stress (kPa)", L - 1, P), "simple-shear", L - 1)
+    check(path, "planar", mode="planar", columns={"stretch": 1})
+
+
 def test_an_area_of_1_mm2_that_is_meant_is_read_as_stated(tmp_path):
     path = written(tmp_path, "test.csv", "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
     check(path, columns={"strain": 1, "stress": "Stress (MPa)"})

@@ -21,6 +21,7 @@ __all__ = [
     "ZERO_ASSUMED",
     "check_lengths",
     "check_positions",
+    "check_shear",
     "check_strain",
     "check_stretches",
     "poisson_ratio",
@@ -94,15 +95,30 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
             f"{table.place(column, row)}: strain {strain[row]:g} without a unit would be {100 * strain[row]:.0f} %. "
             'Give strain_unit="%" (--strain-unit %) if it is percent, strain_unit="1" if it is a plain ratio.'
         )
-    start = int(np.argmin(np.abs(strain - 1.0)))
-    starts_at_one = abs(strain[start] - 1.0) < 0.02 and abs(stress[start]) <= 0.02 * np.abs(stress).max()
-    if starts_at_one and np.abs(strain).min() > 0.2:
+    if (start := _rest_at_one(strain, stress)) is not None:
         name = table.key(column)
         raise InputError(
             f"{table.place(column, start)}: at strain {strain[start]:g} there is no stress, and the column "
             f'never comes near 0: it looks like a stretch. Say so: columns={{"stretch": "{name}"}} or '
             f"--column stretch={_quoted(name)}."
         )
+
+
+def check_shear(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
+    """Refuse a column of amounts of shear that are 1 where there is no stress."""
+    if (start := _rest_at_one(shear, stress)) is not None:
+        raise InputError(
+            f"{table.place(choice.deformation, start)}: at an amount of shear of {shear[start]:g} there is no stress, "
+            "and the column never comes near 0. If 1 was added to it, take that off; if it is a stretch, give the mode "
+            "in which the specimen was stretched, such as --mode planar, and the column as stretch."
+        )
+
+
+def _rest_at_one(deformation: Column, stress: Column) -> int | None:
+    """Return the row of a deformation of 1 where that carries no stress, of one that never comes near 0."""
+    start = int(np.argmin(np.abs(deformation - 1.0)))
+    starts_at_one = abs(deformation[start] - 1.0) < 0.02 and abs(stress[start]) <= 0.02 * np.abs(stress).max()
+    return start if starts_at_one and np.abs(deformation).min() > 0.2 else None
 
 
 def _quoted(name: str) -> str:
