@@ -106,6 +106,29 @@ def test_stresses_along_axes_whose_measure_is_open_are_asked_about_and_the_advic
     np.testing.assert_allclose(test.stress, np.outer(1e-3 * stress / ramp(), [1, 2]).reshape(60, 2), atol=2e-6)
 
 
+@pytest.mark.parametrize(
+    ("above", "own", "names"),
+    [
+        ([], ["10% PVA", "15% PVA", "20% PVA"], ["10% PVA", "15% PVA", "20% PVA"]),
+        (["", "Control", "", "Treated"], ["n1", "n2", "n1"], ["Control n1", "Control n2", "Treated n1"]),
+        ([], ["gel", "gel", "gel"], ["1", "2", "3"]),
+    ],
+)
+def test_columns_of_specimens_are_given_by_the_first_and_the_last_number(tmp_path, above, own, names):
+    """As tables beside the figures of papers have them."""
+    path = written(tmp_path / "figure.csv", one_column_a_specimen(["Strain", *own], above))
+    with pytest.raises(
+        InputError, match=r"If columns 2 to 4 hold the stresses .* --column stress=2:4 and --stress-uni"
+    ):
+        read_tests(path)
+    check(read_tests(path, columns={"stress": "2:4"}, stress_unit="kPa"), names=names)
+    first_two = read_tests(path, columns={"strain": 1, "stress": "2:3"}, stress_unit="kPa")
+    check(first_two, names=[test.name for test in first_two], sizes=(1.0, 1.1))
+    for numbers in ("2:5", "3:2", "0:2"):
+        with pytest.raises(InputError, match=f"has no columns {numbers}: it has 4 columns, counted from 1"):
+            read_tests(path, columns={"stress": numbers}, stress_unit="kPa")
+
+
 def test_a_shorter_test_ends_where_its_cells_do(tmp_path):
     rows = pairs(["Strain", "Stress [kPa]"] * 3)
     common = one_column_a_specimen(["Strain", "Stress_S1 [kPa]", "Stress_S2 [kPa]", "Stress_S3 [kPa]"])

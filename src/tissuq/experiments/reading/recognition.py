@@ -48,6 +48,8 @@ OTHER_MEASURE = (
 """Within names of a strain or stress that is, or may be, another one than the engineering one."""
 NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
+FEWEST_SPECIMENS = 2
+"""Columns whose names are not known that may be of as many specimens."""
 IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력|давлени")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
     r"modul|time|zeit|czas|temp|tijd|时间|時間|시간|время|температур|модул|энерги|скорост|温度|模量|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
@@ -164,7 +166,7 @@ def recognise(
         raise ambiguous(table, [_role_among(table, contents, candidates, column) for column in columns], columns)
     if not columns:
         by_role = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
-        hint = by_role or _of_other_quantities(table, roles)
+        hint = by_role or _of_other_quantities(table, roles) or _several_hint(table, contents, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
         of_roles = (
@@ -214,6 +216,20 @@ def _stress_hint(table: Table, contents: Contents) -> str:
         if is_stress and (is_symbol or NOT_ENGINEERING.search(quantity)):
             return f" Column {table.label(column)} may be a stress of several types. {say_which('stress')}"
     return ""
+
+
+def _several_hint(table: Table, contents: Contents, roles: Sequence[str]) -> str:
+    """Return how columns of several specimens are given, where they stand beside one another and one deformation."""
+    deformations = contents.fitting(*LENGTHENINGS, "shear")
+    by_unit = _by_unit(table, table.quantities)
+    columns = sorted({*by_unit.get("", []), *by_unit.get("stress", [])} - {*deformations})
+    are_beside = columns == [*range(columns[0], columns[-1] + 1)] if columns else False
+    if "stress" not in roles or len(deformations) != 1 or len(columns) < FEWEST_SPECIMENS or not are_beside:
+        return ""
+    return (
+        f" If columns {columns[0] + 1} to {columns[-1] + 1} hold the stresses of several specimens, give "
+        f"--column stress={columns[0] + 1}:{columns[-1] + 1} and --stress-unit."
+    )
 
 
 def say_which(kind: str) -> str:

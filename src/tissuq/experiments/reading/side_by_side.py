@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.arrangement import names_above
@@ -32,6 +33,8 @@ PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer
 """Words and capacities that tell one load cell from another, and not tests."""
 BETWEEN_WORDS = re.compile(r"\s+|(?<=\w)\.(?=[^\W\d]{2})")
 """Blanks, or the points of R, as in ``S1.strain``."""
+SEVERAL_COLUMNS = re.compile(r"(\d+)\s*:\s*(\d+)")
+"""Numbers of the first and the last one, as in ``2:5``."""
 OF_WAY = re.compile(rf"\(({'|'.join(map(re.escape, sorted(ROLES['displacement'])))})\)")
 """Over which displacement a strain was measured, as in ``Compressive strain (Extension) 1``."""
 CLOCK = re.compile(r"(time|zeit|temps|tiempo|tempo|czas|время|时间|時間|시간) ?(?P<test>[^\W_]+)")
@@ -126,21 +129,37 @@ def test_beside(table: Table, load: int, mode: LoadingMode, options: ReadingOpti
 
 
 def columns_named_again(table: Table, columns: Mapping[str, str | int]) -> list[ColumnsOfTest]:
-    """Return the columns of every test where names that are given stand over several columns; nothing elsewhere.
+    """Return the columns of every test where what is given means several columns; nothing elsewhere.
 
-    WebPlotDigitizer names all of a picture's curves X and Y, beneath the name of each. A column that stands there once
-    is of all tests.
+    WebPlotDigitizer names all of a picture's curves X and Y, beneath the name of each; ``2:5`` are the columns from the
+    second to the fifth. A column that stands there once is of all tests.
     """
-    by_role = {role: [k for k, name in enumerate(table.names, 1) if name == wanted] for role, wanted in columns.items()}
+    by_role = {role: _columns_meant(table, wanted) for role, wanted in columns.items()}
     counts = {len(numbers) for numbers in by_role.values()} - {1}
     loads = [number - 1 for role in LOADS for number in by_role.get(role, [])]
     if len(counts) != 1 or 0 in counts or len(loads) not in counts:
         return []
-    names = names_above(table, loads) or [str(number) for number in range(1, len(loads) + 1)]
+    own, groups = [table.names[load] for load in loads], names_above(table, loads, are_distinct=False)
+    in_groups = [" ".join(words) for words in zip(groups, own, strict=False)]
+    numbers_of_tests = [str(number) for number in range(1, len(loads) + 1)]
+    options = (names_above(table, loads), own if all(own) else [], in_groups)
+    names = next((names for names in options if names and len(set(names)) == len(names)), numbers_of_tests)
     return [
         ColumnsOfTest(name, {role: numbers[k % len(numbers)] for role, numbers in by_role.items()})
         for k, name in enumerate(names)
     ]
+
+
+def _columns_meant(table: Table, wanted: str | int) -> list[int]:
+    """Return the columns, from 1, that a name or numbers mean."""
+    text = str(wanted).strip()
+    if named := [number for number, name in enumerate(table.names, 1) if name == text]:
+        return named
+    several = SEVERAL_COLUMNS.fullmatch(text)
+    first, last = map(int, several.groups() if several else (text, text)) if several or text.isdecimal() else (1, 0)
+    if last > len(table.names) or (several and not 1 <= first < last):
+        raise InputError(f"{table.file} has no columns {text}: it has {len(table.names)} columns, counted from 1.")
+    return list(range(first, last + 1))
 
 
 def _columns_of_first(candidates: Sequence[str], roles: Sequence[_Role]) -> tuple[str, list[int]]:
