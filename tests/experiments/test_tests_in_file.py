@@ -359,6 +359,8 @@ def test_letters_in_a_column_of_modes_that_are_none_are_refused(tmp_path):
     path = written(tmp_path / "rows.csv", [["mode", "stretch", "stress_kPa"], *rows])
     with pytest.raises(InputError, match=r"column 'mode': 'BT' is no loading mode that is known\. .*equibiaxial"):
         read_tests(path)
+    (test,) = read_tests(path, only={"mode": "BT"}, mode="equibiaxial")
+    assert test.mode.name == "equibiaxial"
 
 
 @pytest.mark.parametrize(

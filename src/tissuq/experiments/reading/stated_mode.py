@@ -140,6 +140,7 @@ def mode_of(
         return wanted, GIVEN
     mode, source, is_by_word = "", "", False
     for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
+        _check_modes_in_column(table, column)
         if len(modes := modes_in_column(table, column)) == 1:
             mode, source = modes.pop(), f"column {table.label(column)}"
             break
@@ -176,14 +177,18 @@ def modes_in_column(table: Table, column: int) -> set[str]:
     """Return the loading modes that the cells of a column name, if its name says that it tells them."""
     if table.quantities[column] not in NAMES_OF_COLUMN:
         return set()
-    modes = {cell: _mode_of_words(cell) for cell in sorted(set(table.texts(column)) - {""})}
-    for cell, mode in modes.items():
-        if not mode and cell.isupper() and len(cell) <= LONGEST_ABBREVIATION:
+    return {_mode_of_words(cell) for cell in set(table.texts(column))} - {""}
+
+
+def _check_modes_in_column(table: Table, column: int) -> None:
+    """Refuse a column that tells the modes, and abbreviates one that is not known."""
+    cells = sorted(set(table.texts(column))) if table.quantities[column] in NAMES_OF_COLUMN else []
+    for cell in cells:
+        if cell.isupper() and len(cell) <= LONGEST_ABBREVIATION and not _mode_of_words(cell):
             raise InputError(
                 f"{table.place(column)}: '{cell}' is no loading mode that is known. Write the mode there, such as "
                 "uniaxial, equibiaxial, planar or simple-shear (tissuq modes lists them), or give --mode."
             )
-    return set(modes.values()) - {""}
 
 
 def direction_of(*texts: str) -> str:
