@@ -197,6 +197,24 @@ def test_columns_without_names_are_asked_for_in_roles_that_the_mode_has(tmp_path
         tq.read(path, mode=mode)
 
 
+def test_a_strain_beyond_1_that_is_called_a_stretch_is_told_by_where_its_stress_is_least(tmp_path):
+    stretch = np.linspace(1.02, 4, 30)
+    path = written(tmp_path, "test.csv", "Stretch,Stress (kPa)", stretch - 1, 1e3 * neo_hookean(stretch))
+    with pytest.raises(
+        InputError, match=r"0.02 where the stress is least\) look like strain, not stretch.*strain=Stre"
+    ):
+        tq.read(path)
+    check(path, stretch=stretch, stress=1e3 * neo_hookean(stretch), columns={"strain": "Stretch"})
+
+
+def test_a_gel_that_breaks_far_in_compression_is_read(tmp_path):
+    """Its stress is least there, and its stretches are none the less what they are called."""
+    stretch, stress = np.linspace(1, 0.3, 30), 1e3 * neo_hookean(np.linspace(1, 0.3, 30))
+    stress += -0.5
+    stress[-2:] = -0.1
+    check(written(tmp_path, "test.csv", "Stretch,Stress (kPa)", stretch, stress), stretch=stretch, stress=stress)
+
+
 def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_reads_it(tmp_path):
     path = written(tmp_path, "shear_1.csv", "Shear,Stress (kPa)", L, P)
     with pytest.raises(InputError, match=r"If 1 was added to it, take that off; .* --mode planar"):

@@ -184,7 +184,8 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
     stress_type = _type_of(table, choice.stress, contents, "stress", contents.stress_type)
     name, is_strain = contents.quantities[choice.deformation], choice.measure == "strain"
     is_percent = "%" in table.stated_units(choice.deformation)
-    if is_strain and not is_percent and set(name.split()) & {"stretch", "lambda", "λ"}:
+    is_named_stretch = is_strain and not is_percent and bool(set(name.split()) & {"stretch", "lambda", "λ"})
+    if is_named_stretch and _ratio_role(table, choice.deformation) == "stretch":
         raise InputError(
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."

@@ -35,7 +35,7 @@ DOUBTFUL_STRAIN = 1.0
 """A strain without a unit beyond this (100 %) may be percent; it is taken for a plain ratio with a warning."""
 RATIO_ASSUMED = "(a plain ratio assumed: the file states no unit)"
 COMPRESSED_LIMIT = 0.5
-"""Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
+"""Stretches that all lie below this, or that do in tension where its stress is least, are taken for strains."""
 FIRST_ROW = "first"
 """What is given for a zero at the first row."""
 ZERO_ASSUMED = "(its first row, assumed: there is little load)"
@@ -65,9 +65,12 @@ INDEPENDENT_ROWS = 10
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
     """Refuse columns of stretches that are not positive, or that are strains by their size."""
     table = measured.table
-    for choice, stretch in zip(choices, measured.stretch, strict=True):
+    for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
-        if choice.measure in SHEARS or (is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT)):
+        at_rest, below_1 = stretch[np.argmin(np.abs(stress))], stretch < 1
+        is_pulled = choice.measure == "stretch" and below_1.any() and np.median(stress[below_1]) > 0
+        is_small = stretch.max() < COMPRESSED_LIMIT or (is_pulled and at_rest < COMPRESSED_LIMIT)
+        if choice.measure in SHEARS or (is_positive and (is_strain or not is_small)):
             continue
         name = table.key(choice.deformation)
         if is_strain:
@@ -75,12 +78,12 @@ def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> 
         else:
             advice = (
                 "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
-                f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
+                f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}; or call it so in the file.'
             )
         if is_positive:
             raise InputError(
-                f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
-                f"{stretch.max():g}) look like strain, not stretch. {advice}"
+                f"{table.place(choice.deformation)}: its values ({stretch.min():g} to {stretch.max():g}, and "
+                f"{at_rest:g} where the stress is least) look like strain, not stretch. {advice}"
             )
         row = int(np.flatnonzero(stretch <= 0)[0])
         raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
