@@ -80,6 +80,11 @@ def test_numbers_too_large_for_mpa_are_asked_about(written):
     assert tq.read_experiment(path, stress_unit="Pa").stress[-1] == pytest.approx(250e-6)
 
 
+def test_numbers_too_large_for_kpa_may_be_in_pa(written):
+    with pytest.raises(InputError, match=r"2\.5e\+08 MPa would be more than soft materials bear.*--stress-unit Pa"):
+        tq.read_experiment(written("Strain,Stress", "0,0\n0.1,8e7\n0.2,2.5e8\n"))
+
+
 @pytest.mark.parametrize("top", [1.1, 1.5, 5.0])
 def test_a_strain_that_may_be_percent_is_said_on_the_first_line(written, top):
     path = written("Strain,Stress (kPa)", f"0,0\n{top / 2},2\n{top},5\n")

@@ -31,6 +31,10 @@ def written(folder, machine, local):
         ("Extensometer (mm)", "displacement"),
         ("Video extension (mm)", "displacement"),
         ("LVDT (mm)", "displacement"),
+        ("EXT1 (mm)", "displacement"),
+        ("Ext.1 (mm)", "displacement"),
+        ("Displacement (Strain 1) (mm)", "displacement"),
+        ("AVE2 (%)", "strain"),
         ("Video Axial Strain (%)", "strain"),
         ("Optical strain (%)", "strain"),
         ("Dehnung Feinwegaufnehmer (%)", "strain"),
@@ -47,6 +51,34 @@ def test_the_measurement_on_the_specimen_is_offered_in_the_form_that_reads_it(tm
     np.testing.assert_allclose(of_specimen.stretch, STRETCH, atol=1e-8)
     of_machine = tq.read_experiment(path, dimensions=SIZES, columns={"displacement": machine})
     np.testing.assert_allclose(of_machine.stretch - 1, MACHINE_STRAIN * (STRETCH - 1), atol=1e-8)
+
+
+def test_an_extensometer_beside_the_machine_is_asked_about_in_each_of_several_tests(tmp_path):
+    """As software of Shimadzu writes them beside one another, under the names of the specimens."""
+    strain = STRETCH - 1
+    columns = (np.arange(50.0), 6 * neo_hookean(STRETCH), 10 * MACHINE_STRAIN * strain, 10 * strain)
+    rows = [",".join([f'"{value:.9f}"' for value in row] * 2) for row in zip(*columns, strict=True)]
+    heads = ['"Disc A",,,,"Disc B",,,', ",".join(['"Time","Force","Stroke","Ext.1"'] * 2)]
+    path = tmp_path / "several.csv"
+    path.write_text("\n".join([*heads, ",".join(['"sec","N","mm","mm"'] * 2), *rows]))
+    with pytest.raises(InputError, match=r'or --column displacement="Ext.1" --column force="Force"\.') as error:
+        tq.read_tests(path, dimensions=SIZES)
+    assert str(error.value).count("'Ext.1'") == 1
+    tests = tq.read_tests(path, dimensions=SIZES, columns={"displacement": "Ext.1", "force": "Force"})
+    assert [test.name for test in tests] == ["Disc A", "Disc B"]
+    for test in tests:
+        np.testing.assert_allclose(test.stretch, STRETCH, atol=1e-8)
+
+
+def test_the_strain_of_an_extensometer_beside_that_of_the_machine_is_asked_about(tmp_path):
+    path = tmp_path / "test.csv"
+    rows = zip(MACHINE_STRAIN * (STRETCH - 1), STRETCH - 1, 1e3 * neo_hookean(STRETCH), strict=True)
+    lines = [",".join(f"{value:.9f}" for value in row) for row in rows]
+    path.write_text("\n".join(["Strain (mm/mm),Strain Ex1 (mm/mm),Stress (kPa)", *lines]))
+    with pytest.raises(InputError, match="They give different stretches") as error:
+        tq.read(path)
+    assert '--column strain="Strain Ex1 (mm/mm)"' in str(error.value)
+    np.testing.assert_allclose(tq.read(path, columns={"strain": "Strain Ex1 (mm/mm)"}).stretch, STRETCH, atol=1e-8)
 
 
 @pytest.mark.parametrize("local", ["Temperature (C)", "Gauge length (mm)"])

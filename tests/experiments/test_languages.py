@@ -1,4 +1,4 @@
-"""Files in Russian, Chinese and Japanese, in any encoding: what is read is what was measured."""
+"""Files in many languages, in any encoding: what is read is what was measured."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.experiments.reading.headings import dimensions_named, heading
+from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.units import FORCE, LENGTH, TORQUE, looks_like_unit, strain_factor, stress_unit
 
@@ -23,6 +24,16 @@ FORCES = [
     (CHINESE, "位移(mm);力(N)", "标距: 20 mm", "截面积: 10 mm2"),
     (CHINESE, "变形(毫米);负荷(牛)", "标距(mm);20", "宽度(mm);5\n厚度(mm);2"),
     (["utf-8", "big5"], "位移(mm);荷重(N)", "標距: 20 mm", "寬度: 5 mm\n厚度: 2 mm"),
+    (["utf-8", "cp949"], "스트로크(mm);하중(N)", "L0: 20 mm", "A0: 10 mm2\n시험편: 인장"),
+    (["utf-8", "cp1250"], "Przemieszczenie (mm);Siła (N)", "Długość pomiarowa: 20 mm", "Przekrój: 10 mm2"),
+    (["utf-8", "cp1250"], "Droga (mm);Obciążenie (N)", "Długość próbki: 20 mm", "Szerokość: 5 mm\nGrubość: 2 mm"),
+    (["utf-8", "cp1252"], "Course standard (mm);Force standard (N)", "L0 - course standard: 20 mm", "Section: 10 mm²"),
+    (
+        ["utf-8", "cp1252"],
+        "Standard travel (mm);Standard force (N)",
+        '"Gage length, standard travel";20;"mm"',
+        '"Cross-section";10;"mm²"',
+    ),
     (["utf-8", "cp932"], "変位(mm);荷重(N)", "標点距離: 20 mm", "幅: 5 mm\n厚さ: 2 mm"),
     (
         ["utf-8", "cp1252"],
@@ -58,14 +69,25 @@ def test_displacement_force_and_sizes_are_read_in_any_encoding(tmp_path, encodin
         ("Истинная деформация;Истинное напряжение, Н/мм2", np.log(STRETCH), STRETCH * STRESS, "Н/мм2"),
         ("Степень растяжения;Напряжение, Па", STRETCH, 1e6 * STRESS, "Па"),
         ("拉伸比;应力(兆帕)", STRETCH, STRESS, "兆帕"),
+        ("拉伸应变 (%);名义应力 (MPa)", 100 * (STRETCH - 1), STRESS, "MPa"),
+        ("Odkształcenie (%);Naprężenie (MPa)", 100 * (STRETCH - 1), STRESS, "MPa"),
+        ("인장 변형률 (%);인장 응력 (MPa)", 100 * (STRETCH - 1), STRESS, "MPa"),
     ],
 )
 def test_strains_and_stresses_are_read_with_their_measures_and_units(tmp_path, names, deformation, load, unit):
-    encoding = "gb18030" if "拉" in names else "cp1251"
+    encodings = {"拉": "gb18030", "ż": "cp1250", "인": "cp949"}
+    encoding = next((encoding for letter, encoding in encodings.items() if letter in names), "cp1251")
     data = tq.read(written(tmp_path, encoding, [], names, deformation, load))
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-7)
     np.testing.assert_allclose(data.stress, STRESS, rtol=1e-7, atol=1e-12)
     assert data.stress_unit == unit
+
+
+@pytest.mark.parametrize("line", ["Aire: 3 cm³", "œsophage, cœur", "Tamaño: ¿3 mm²?", "œuvre éprouvette", "kg/m³ x¹"])
+def test_powers_and_letters_of_western_europe_are_not_taken_for_polish(tmp_path, line):
+    path = tmp_path / "test.csv"
+    path.write_bytes(line.encode("cp1252"))
+    assert read_lines(path) == [line]
 
 
 def test_a_column_of_specimens_in_russian_parts_them(tmp_path):

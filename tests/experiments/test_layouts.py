@@ -90,6 +90,24 @@ def test_one_unknown_unit_among_known_ones_is_a_unit(tmp_path, separator):
     assert table.units == ("mm", "N", "segments")
 
 
+@pytest.mark.parametrize("end", ["<END DATA>\n", ""])
+def test_of_positions_along_three_axes_the_one_that_moves_is_read(tmp_path, end):
+    """As a Mach-1 writes them, between lines that say where data begin and end."""
+    stretch, path = ramp(1.3), tmp_path / "move.txt"
+    head = "<Mach-1 File>\n<INFO>\nDate:\t2020-02-03\n<END INFO>\n<Move Relative>\nVelocity, mm/s:\t0.1\n<DATA>\n"
+    names = "\t".join(["Time, s", *(f"Position ({axis}), mm" for axis in "zxy"), "Fz, gf"])
+    load = 10 * neo_hookean(stretch) / 9.80665e-3
+    rows = [
+        f"{k}\t{12 + 10 * (x - 1):.6f}\t0.000\t0.000\t{f:.6f}\n"
+        for k, (x, f) in enumerate(zip(stretch, load, strict=True))
+    ]
+    path.write_text(f"{head}{names}\n{''.join(rows)}{end}")
+    with pytest.warns(UserWarning, match=r"check the column: 'Position \(z\), mm' was taken for the displacement"):
+        data = tq.read(path, length="10 mm", area="10 mm2")
+    np.testing.assert_allclose(data.stretch, stretch, atol=2e-6)
+    np.testing.assert_allclose(data.stress, neo_hookean(stretch), atol=2e-6)
+
+
 def test_names_of_one_letter_are_not_units_of_a_statement_above(tmp_path):
     path = written(tmp_path / "a.csv", "Operator,JR", "N,s,strain", *lines_of(FORCE, MOVED, STRETCH - 1))
     reading = find_tests_in_file(path, columns={"force": "N"}, dimensions={"area": "10 mm2"}, force_unit="N")[0].reading

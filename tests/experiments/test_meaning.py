@@ -36,6 +36,10 @@ def check(path, expected="uniaxial", stretch=L, stress=P, **options):
         ("EngStrain,EngStress_kPa,TrueStrain,TrueStress_kPa", (L - 1, P, np.log(L), P * L)),
         ("Circumferential stretch,Circumferential Cauchy stress (kPa)", (L, P * L)),
         ("Strain (mm/m),Stress (kPa)", (1000 * (L - 1), P)),
+        ("% Strain,Stress (kPa)", (100 * (L - 1), P)),
+        ("Draw ratio,Stress (kPa)", (L, P)),
+        ("Strain,Stress mean (kPa),Stress min (kPa),Stress max (kPa)", (L - 1, P, 0.9 * P, 1.1 * P)),
+        ("Strain,Stress exp (kPa),Stress sim (kPa)", (L - 1, P, 1.1 * P)),
         ("GreenStrain (%),PK2 (kPa)", (50 * (L**2 - 1), P / L)),
         ("Green strain E (-),2nd PK stress S (kPa)", ((L**2 - 1) / 2, P / L)),
     ],
@@ -48,6 +52,8 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
     "head",
     [
         "AxialDisplacement(mm),ForceN",
+        "displacement_mm,force_n",
+        "Cross Head Travel (mm),Load (N)",
         "Position(Linear:Position) (mm),Load(Linear:Load) (N)",
         "Spostamento [mm],Forza [N]",
         "変位(mm),荷重(N)",
@@ -141,6 +147,28 @@ def test_pure_shear_is_planar(tmp_path, name):
             "--tension-positive",
             {"dimensions": SIZES, "compression_positive": False},
         ),
+        ("rubber_PS.csv", "Stretch,Stress (kPa)", (L, P), "--mode uniaxial, or another", {"mode": "uniaxial"}),
+        (
+            "of_area_1.csv",
+            "Strain,Force (kN),Stress (MPa)",
+            (L - 1, 1e-3 * N, N),
+            '--column force="Force (kN)", and the --area',
+            {"dimensions": {"area": "4 mm2"}, "columns": {"force": "Force (kN)"}},
+        ),
+        (
+            "membrane.csv",
+            "Pressure (kPa),Stretch,Stress (kPa)",
+            (L - 1, L, P),
+            "--mode uniaxial",
+            {"mode": "uniaxial"},
+        ),
+        (
+            "two_strains.csv",
+            "Strain_x,Lambda_x,Stress_x (kPa)",
+            (100 * (L - 1), L, P),
+            "may be the strain or stretch: 'Strain_x' (number 1) and 'Lambda_x' (number 2)",
+            {"columns": {"stretch": "Lambda_x"}},
+        ),
         ("percent.csv", "Stretch (%),Stress (kPa)", (100 * (L - 1), P), "strain=", {"columns": {"strain": 1}}),
         ("weight.csv", "Displacement (mm),Load (g)", (D, N / 9.80665e-3), "force_unit gf", {"force_unit": "gf"}),
     ],
@@ -153,6 +181,51 @@ def test_what_is_open_is_asked_about_and_the_advice_reads_it(tmp_path, name, hea
         tq.read_tests(path, **sizes)
     assert words.replace("force_unit", "--force-unit") in str(refusal.value)
     check(path, **(sizes | options))
+
+
+def test_a_height_in_percent_is_no_length(tmp_path):
+    path = written(tmp_path, "test.csv", "Height (mm),Height (%),Stress (kPa)", 10 * L, 100 * L, P)
+    check(path, length="10 mm")
+
+
+@pytest.mark.parametrize("mode", ["simple-shear", "uniaxial"])
+def test_columns_without_names_are_asked_for_in_roles_that_the_mode_has(tmp_path, mode):
+    path = tmp_path / "test.csv"
+    path.write_text("".join(f"{k},{strain:.8g}\n" for k, strain in enumerate(L - 1)))
+    role = "shear" if mode == "simple-shear" else "stretch"
+    with pytest.raises(InputError, match=rf"--column {role}=1 --column stress=2"):
+        tq.read(path, mode=mode)
+
+
+def test_a_strain_beyond_1_that_is_called_a_stretch_is_told_by_where_its_stress_is_least(tmp_path):
+    stretch = np.linspace(1.02, 4, 30)
+    path = written(tmp_path, "test.csv", "Stretch,Stress (kPa)", stretch - 1, 1e3 * neo_hookean(stretch))
+    with pytest.raises(
+        InputError, match=r"0.02 where the stress is least\) look like strain, not stretch.*strain=Stre"
+    ):
+        tq.read(path)
+    check(path, stretch=stretch, stress=1e3 * neo_hookean(stretch), columns={"strain": "Stretch"})
+
+
+def test_a_gel_that_breaks_far_in_compression_is_read(tmp_path):
+    """Its stress is least there, and its stretches are none the less what they are called."""
+    stretch, stress = np.linspace(1, 0.3, 30), 1e3 * neo_hookean(np.linspace(1, 0.3, 30))
+    stress += -0.5
+    stress[-2:] = -0.1
+    check(written(tmp_path, "test.csv", "Stretch,Stress (kPa)", stretch, stress), stretch=stretch, stress=stress)
+
+
+def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_reads_it(tmp_path):
+    path = written(tmp_path, "shear_1.csv", "Shear,Stress (kPa)", L, P)
+    with pytest.raises(InputError, match=r"If 1 was added to it, take that off; .* --mode planar"):
+        tq.read(path)
+    check(written(tmp_path, "shear_2.csv", "Shear,Stress (kPa)", L - 1, P), "simple-shear", L - 1)
+    check(path, "planar", mode="planar", columns={"stretch": 1})
+
+
+def test_an_area_of_1_mm2_that_is_meant_is_read_as_stated(tmp_path):
+    path = written(tmp_path, "test.csv", "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
+    check(path, columns={"strain": 1, "stress": "Stress (MPa)"})
 
 
 def test_compression_that_is_named_is_not_read_as_tension(tmp_path):

@@ -121,6 +121,19 @@ def test_heights_are_read_over_that_of_the_first_row(tmp_path, name, unit, start
     np.testing.assert_allclose(as_positions.stretch, data.stretch, rtol=1e-6)
 
 
+def test_a_distance_of_grips_is_a_length_and_where_it_stays_a_size(tmp_path):
+    stretch, path = ramp(1.3), tmp_path / "test.csv"
+    force = AREA * neo_hookean(stretch)
+    rows = [f"{50 * x:.6f},{f:.8f},50\n" for x, f in zip(stretch, force, strict=True)]
+    path.write_text(f"Grip separation (mm),Force (N),Gauge length (mm)\n{''.join(rows)}")
+    data = tq.read_experiment(path, dimensions={"area": "10 mm2"})
+    np.testing.assert_allclose(data.stretch, stretch, atol=1e-6)
+    rows = [f"{50 * (x - 1):.6f},{f:.8f},50\n" for x, f in zip(stretch, force, strict=True)]
+    path.write_text(f"Extension (mm),Force (N),Grip separation (mm)\n{''.join(rows)}")
+    data = tq.read_experiment(path, dimensions={"area": "10 mm2"})
+    np.testing.assert_allclose(data.stretch, stretch, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [("10.2,1\n10.2,2\n", "stays 10.2 mm long"), ("10.2,1\n-5,2\n", "cannot be -5 mm long")],

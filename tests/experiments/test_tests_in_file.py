@@ -10,6 +10,7 @@ import pytest
 import tissuq as tq
 from machine_files import MU, neo_hookean, ramp
 from tissuq.errors import InputError
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
 
 STIFFNESS = {"S1": 1.0, "S2": 1.1, "S3": 1.2}
@@ -103,6 +104,29 @@ def test_stresses_along_axes_whose_measure_is_open_are_asked_about_and_the_advic
     (test,) = read_tests(path, stress_type="cauchy")
     assert test.mode.name == "biaxial"
     np.testing.assert_allclose(test.stress, np.outer(1e-3 * stress / ramp(), [1, 2]).reshape(60, 2), atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("above", "own", "names"),
+    [
+        ([], ["10% PVA", "15% PVA", "20% PVA"], ["10% PVA", "15% PVA", "20% PVA"]),
+        (["", "Control", "", "Treated"], ["n1", "n2", "n1"], ["Control n1", "Control n2", "Treated n1"]),
+        ([], ["gel", "gel", "gel"], ["1", "2", "3"]),
+    ],
+)
+def test_columns_of_specimens_are_given_by_the_first_and_the_last_number(tmp_path, above, own, names):
+    """As tables beside the figures of papers have them."""
+    path = written(tmp_path / "figure.csv", one_column_a_specimen(["Strain", *own], above))
+    with pytest.raises(
+        InputError, match=r"If columns 2 to 4 hold the stresses .* --column stress=2:4 and --stress-uni"
+    ):
+        read_tests(path)
+    check(read_tests(path, columns={"stress": "2:4"}, stress_unit="kPa"), names=names)
+    first_two = read_tests(path, columns={"strain": 1, "stress": "2:3"}, stress_unit="kPa")
+    check(first_two, names=[test.name for test in first_two], sizes=(1.0, 1.1))
+    for numbers in ("2:5", "3:2", "0:2"):
+        with pytest.raises(InputError, match=f"has no columns {numbers}: it has 4 columns, counted from 1"):
+            read_tests(path, columns={"stress": numbers}, stress_unit="kPa")
 
 
 def test_a_shorter_test_ends_where_its_cells_do(tmp_path):
@@ -308,6 +332,77 @@ def test_tests_of_specimens_and_modes_in_rows_are_parted_by_both(tmp_path):
         for mode, top in (("uniaxial", uni), ("equibiaxial", equi))
     ]
     assert [test.specimen for test in tests] == ["A", "A", "B", "B"]
+
+
+MODES = {"UT": ("uniaxial", -2), "EB": ("equibiaxial", -5), "PS": ("planar", -3)}
+"""Loading modes as tables abbreviate them, with the power of a neo-Hookean stress in each."""
+
+
+def check_modes(tests):
+    """Compare tests with a neo-Hookean specimen in each of the modes."""
+    assert [test.mode.name for test in tests] == [mode for mode, _ in MODES.values()]
+    for test, (_, power) in zip(tests, MODES.values(), strict=True):
+        np.testing.assert_allclose(test.stretch, ramp(), atol=2e-6)
+        np.testing.assert_allclose(test.stress, MU * (ramp() - ramp() ** power), atol=2e-6)
+
+
+@pytest.mark.parametrize("column", ["mode", "Type"])
+def test_a_column_that_abbreviates_modes_tells_them(tmp_path, column):
+    rows = [[column, "stretch", "stress_kPa"]]
+    for name, (_, power) in MODES.items():
+        rows += [[name, *row] for row in rows_of(ramp(), 1e3 * MU * (ramp() - ramp() ** power))]
+    check_modes(read_tests(written(tmp_path / "rows.csv", rows)))
+
+
+def test_letters_in_a_column_of_modes_that_are_none_are_refused(tmp_path):
+    rows = [[mode, *row] for mode in ("UT", "BT") for row in rows_of(ramp(), 1e3 * neo_hookean(ramp()))]
+    path = written(tmp_path / "rows.csv", [["mode", "stretch", "stress_kPa"], *rows])
+    with pytest.raises(InputError, match=r"column 'mode': 'BT' is no loading mode that is known\. .*equibiaxial"):
+        read_tests(path)
+    (test,) = read_tests(path, only={"mode": "BT"}, mode="equibiaxial")
+    assert test.mode.name == "equibiaxial"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["Uniaxial {} {}", "Equibiaxial {} {}", "Planar {} {}"],
+        ["{}_uniaxial {}", "{}_equibiaxial {}", "{}_pure_shear {}"],
+        ["UT_{} {}", "EB_{} {}", "PS_{} {}"],
+    ],
+)
+def test_columns_that_modes_tell_apart_are_tests_in_these_modes(tmp_path, names):
+    header = [name.format(*of) for name in names for of in (("strain", "(-)"), ("stress", "(kPa)"))]
+    columns = [column for _, power in MODES.values() for column in (ramp() - 1, 1e3 * MU * (ramp() - ramp() ** power))]
+    check_modes(read_tests(written(tmp_path / "wide.csv", [header, *rows_of(*columns)])))
+
+
+def test_what_two_modes_may_be_called_is_said_where_their_columns_do_not_fit(tmp_path):
+    header = ["stretch_uniaxial", "stress_uniaxial", "stretch_{}", "stress_{}"]
+    rows = rows_of(*[ramp(), neo_hookean(ramp())] * 2)
+    for mode, meant in (("shear", "call it planar"), ("biaxial", "call it equibiaxial")):
+        path = written(tmp_path / f"{mode[0]}.csv", [[name.format(mode) for name in header], *rows])
+        with pytest.raises(InputError, match=meant):
+            read_tests(path)
+
+
+def test_specimens_1_and_2_with_times_of_their_own_are_no_axes(tmp_path):
+    names = ["Time {}", "Extension {} (mm)", "Load {} (N)", "Tensile strain (Extension) {} (%)"]
+    header = [name.format(k) for k in (1, 2) for name in names]
+    stretch = ramp()
+    columns = [
+        column
+        for size in (1.0, 1.1)
+        for column in (stretch, 10 * (stretch - 1), 10 * size * neo_hookean(stretch), 100 * (stretch - 1))
+    ]
+    path = written(tmp_path / "wide.csv", [header, *rows_of(*columns)])
+    tests = find_tests_in_file(path, dimensions=SIZES)
+    check([test.reading.experiment for test in tests], names="12", sizes=(1.0, 1.1))
+    assert not [warning for test in tests for warning in data_warnings(test.reading) if "biaxial" in str(warning)]
+    of_axes = [k for k, name in enumerate(header) if "Time" not in name]
+    rows = [[header[k] for k in of_axes], *rows_of(*[columns[k] for k in of_axes])]
+    with pytest.raises(InputError, match="is of a biaxial test"):
+        read_tests(written(tmp_path / "axes.csv", rows), dimensions=SIZES)
 
 
 def test_a_mode_comes_from_the_name_of_a_file_and_a_misfit_says_so(tmp_path):

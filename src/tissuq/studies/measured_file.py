@@ -40,7 +40,7 @@ class ReadingSettings(Settings):
         default_factory=dict,
         help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, or "
         "pressure, outer_diameter (or inner_diameter), axial_stretch and force (or total_force) of a tube, such as "
-        "stretch=Strain; of the "
+        "stretch=Strain, or stress=2:5 for columns of as many tests; of the "
         "spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
         name="column",
         parse=pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column),

@@ -241,10 +241,11 @@ def _joined(quantity: str, label: str) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-def names_above(table: Table, columns: Sequence[int]) -> list[str]:
+def names_above(table: Table, columns: Sequence[int], *, are_distinct: bool = True) -> list[str]:
     """Return what the last line above the names of columns says over each of some; nothing where it says no names.
 
-    What stands over the first of neighbouring columns goes for them all. A line of sizes says no names.
+    What stands over the first of neighbouring columns goes for them all: of those asked for each has another, unless
+    they may be of groups. A line of sizes says no names.
     """
     names = table.quantities
     for _, text in reversed(table.head):
@@ -255,7 +256,8 @@ def names_above(table: Table, columns: Sequence[int]) -> list[str]:
             continue
         names_over = filled_on(cells + [""] * (len(names) - len(cells)))
         over = [names_over[column] for column in columns]
-        if all(over) and len({plain(name) for name in over}) == len(over):
+        count = len({plain(name) for name in over})
+        if all(over) and (count == len(over) or (count > 1 and not are_distinct)):
             return over
     return []
 

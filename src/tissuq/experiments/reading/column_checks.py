@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -23,13 +24,15 @@ from tissuq.experiments.reading.recognition import (
     say_which,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.units import measured_in
+from tissuq.experiments.reading.vocabulary import ROLES
+from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
 __all__ = [
     "SPREAD_ROLES",
     "check_is_shear",
     "check_machine",
     "check_roles",
+    "check_section",
     "check_test",
     "check_together",
     "with_types",
@@ -49,6 +52,7 @@ SHEAR_STRESS = re.compile(
 )
 ON_SPECIMEN = re.compile(
     r"exten[sz]om|estensim|aufnehmer|video|opti[ck]|[oó]ptic|ottic|camera|kamera|laser|marker|clip|gau?ge|lvdt|\bdic\b|"
+    r"\bext(\b|\d)|\bave ?\d|\b(gap)?ex ?\d\b|\(strain ?\d\)|"
     r"伸び計|引伸[计計]|экстензометр|видео|оптич|камер|лазер|датчик деформ"
 )
 """Names of a deformation that is measured on the specimen itself, not by the displacement of the machine."""
@@ -62,6 +66,8 @@ LARGEST_RATIO = 5.0
 """Number without a unit beyond which a column is taken for no strain or stretch."""
 MAX_DIFFERENCE = 0.01
 """Largest difference of two columns, over the range of one, at which they say the same."""
+SAME_NUMBERS = 1e-3
+"""Largest difference of a stress and a force over 1 mm2, over the largest force."""
 NORMAL = re.compile(r"normal|axial|^f ?[nz]$|нормальн|осев")
 OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
@@ -69,10 +75,11 @@ OSCILLATION = re.compile(
 """Names of what is measured in oscillations."""
 
 
-def check_machine(table: Table, quantities: Sequence[str], column_read: int, measure: str) -> None:
+def check_machine(table: Table, quantities: Sequence[str], column_read: int, measure: str, load: str = "") -> None:
     """Ask which is read where the deformation was measured twice: by the machine, and on the specimen.
 
     By an extensometer or a camera, as names say; or, beside a displacement, in a column of strains or stretches.
+    ``load`` is how the column of the load is given, where both are needed.
     """
     on_specimen = [
         column for column, name in enumerate(quantities) if ON_SPECIMEN.search(name) and not table.is_constant(column)
@@ -91,9 +98,9 @@ def check_machine(table: Table, quantities: Sequence[str], column_read: int, mea
     seen = {column: role for column, role in seen.items() if role}
     if not seen or (measure != "displacement" and all(_is_same(table, column_read, column) for column in seen)):
         return
-    labels = " and ".join(map(table.label, seen))
+    labels = " and ".join(dict.fromkeys(map(table.label, seen)))
     choices = [(measure, column_read), *((str(role), column) for column, role in seen.items())]
-    flags = " or ".join(f'--column {role}="{table.names[column]}"' for role, column in choices)
+    flags = " or ".join(dict.fromkeys(f'--column {role}="{table.names[column]}"{load}' for role, column in choices))
     raise InputError(
         f"{table.file}: column {table.label(column_read)} is the {measure} of the machine, and {labels} was "
         "measured on the specimen, by an extensometer or a camera. They give different stretches. Say which is read: "
@@ -177,7 +184,8 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
     stress_type = _type_of(table, choice.stress, contents, "stress", contents.stress_type)
     name, is_strain = contents.quantities[choice.deformation], choice.measure == "strain"
     is_percent = "%" in table.stated_units(choice.deformation)
-    if is_strain and not is_percent and set(name.split()) & {"stretch", "lambda", "λ"}:
+    is_named_stretch = is_strain and not is_percent and bool(set(name.split()) & {"stretch", "lambda", "λ"})
+    if is_named_stretch and _ratio_role(table, choice.deformation) == "stretch":
         raise InputError(
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."
@@ -267,6 +275,28 @@ def check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_s
             "amplitudes and no curve of one test. If there is a curve all the same, say which columns it is in: "
             "--column shear=NAME --column stress=NAME."
         )
+
+
+def check_section(table: Table, stress: int, load: str) -> None:
+    """Ask about stresses that are a force over exactly 1 mm2, as software states them to which nobody said the area."""
+    forces = [k for k, quantity in enumerate(table.quantities) if quantity in ROLES["force"] and table.varies(k)]
+    of_area_1 = [force for force in forces if load == "stress" and _is_over_1_mm2(table, stress, force)]
+    if of_area_1:
+        raise InputError(
+            f"{table.place(stress)} is {table.label(of_area_1[0])} over 1 mm2, as the software of a machine states it "
+            f'where no cross-section was entered. Give the forces, --column force="{table.names[of_area_1[0]]}", and '
+            f'the --area of the specimen; if that is 1 mm2 all the same, --column stress="{table.names[stress]}".'
+        )
+
+
+def _is_over_1_mm2(table: Table, stress: int, force: int) -> bool:
+    """Tell whether a column of stresses holds forces in N as MPa; not where units or cells are faulty."""
+    with suppress(InputError):
+        stresses, forces = table.numbers([stress, force])
+        megapascals = stress_unit(table.unit(stress)).to_mpa * stresses
+        newtons = FORCE.factor(table.unit(force)) * forces
+        return bool(np.abs(megapascals - newtons).max() <= SAME_NUMBERS * np.abs(newtons).max())
+    return False
 
 
 def check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnChoice]) -> None:

@@ -118,7 +118,8 @@ def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> No
     if unit:
         reason, likely = f"but {source} speaks of {unit}", unit
     elif largest > LARGEST_ASSUMED_STRESS:
-        reason, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
+        reason = f"and {largest:g} MPa would be more than soft materials bear"
+        likely = "kPa" if largest <= 1e3 * LARGEST_ASSUMED_STRESS else "Pa"
     else:
         return
     raise InputError(

@@ -13,6 +13,7 @@ from tissuq.experiments.reading.column_checks import (
     check_is_shear,
     check_machine,
     check_roles,
+    check_section,
     check_test,
     check_together,
     with_types,
@@ -150,6 +151,7 @@ def _choice(
         unnamed |= {stress} if by_unit else set()
         is_per_width = measured_in(table.unit(stress)) == FORCE_PER_WIDTH.name
         load = "force" if load == "stress" and is_per_width else load
+        check_section(table, stress, load)
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])

@@ -20,6 +20,7 @@ from tissuq.experiments.reading.plausibility import (
     ZERO_ASSUMED,
     check_lengths,
     check_positions,
+    check_shear,
     check_strain,
 )
 from tissuq.experiments.reading.recognition import DIAMETERS, ColumnChoice
@@ -88,7 +89,9 @@ def _from_ratio(
         check_strain(table, choice, values * factor, load, has_unit=has_unit)
         is_doubtful = not has_unit and np.abs(values).max() > DOUBTFUL_STRAIN
         scaled += f" {RATIO_ASSUMED}" if is_doubtful else ""
-    elif not is_shear:
+    elif is_shear:
+        check_shear(table, choice, values * factor, load)
+    else:
         return values * factor, f"stretch = column {label}{scaled}"
     try:
         converted, formula = STRAIN_MEASURES[choice.strain_type].converted(values * factor, is_shear)

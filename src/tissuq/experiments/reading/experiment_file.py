@@ -53,6 +53,7 @@ from tissuq.experiments.reading.spread import Spread
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,
     about_mode,
+    check_not_inflated,
     check_not_sheared,
     comment_on_mode,
     direction_of,
@@ -305,8 +306,10 @@ def read_rows(
     with about_mode(mode.name, mode_source):
         labelled_choices = choose_columns(table, mode, options)
     choices = tuple(labelled_choices.values())
-    if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
-        check_not_sheared(table)
+    if mode_source == DEFAULT_SOURCE and choices[0].load == "stress":
+        if choices[0].measure == "strain":
+            check_not_sheared(table)
+        check_not_inflated(table, choices[0].stress)
     has_axial_stretch = isinstance(mode, InflatedTube) or choices[-1].measure == ROLE_OF_AXIAL_STRETCH
     axial_column = column_of_axial_stretch(table, options) if has_axial_stretch else None
     absent = set[int]()

@@ -20,6 +20,7 @@ from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import Cycle, labelled
 from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
 from tissuq.experiments.reading.rows_of_tests import advice_on_numbered_tests, jump
+from tissuq.experiments.reading.side_by_side import test_beside
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
@@ -322,7 +323,8 @@ def _other_axis(reading: Reading, number: int) -> str:
     table = reading.table
     choice = reading.choices[number]
     axis, _ = on_axis(table.quantities[choice.deformation])
-    if not axis or not isinstance(reading.experiment.mode.along_axis_1, Uniaxial):
+    mode = reading.experiment.mode
+    if not axis or not isinstance(mode.along_axis_1, Uniaxial) or test_beside(table, choice.stress, mode, {}):
         return ""
     names = enumerate(map(on_axis, table.quantities))
     across = [(column, name) for column, (name_axis, name) in names if name_axis not in ("", axis)]

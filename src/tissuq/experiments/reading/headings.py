@@ -57,14 +57,19 @@ CORRECTED = re.compile(
 """Words beside the name of what was corrected."""
 DIRECTION_IN_BRACKETS = re.compile(r"\s*[\[(](compress\w*|tens\w*|druck|zug)[\])]", re.IGNORECASE)
 """Of a load, as in ``Strain (compression) [%]``: it tells the sign alone."""
+PERCENT_BEFORE = re.compile(r"^\s*%\s*([^\W\d_][^%\[(]*)$")
+"""The unit before a name, as in ``% Strain``; no other one follows it."""
+NEWTONS = {"n": "N", "kn": "kN", "mn": "mN"}
+FORCE_IN_SMALL_LETTERS = re.compile(rf"(?P<quantity>([a-z]+_)*(force|load))_(?P<unit>{'|'.join(NEWTONS)})")
+"""With its unit, as programs write names of columns: ``force_n``."""
 LINK = re.compile(r"\(\)|\b(de|di|of|nach|selon|according to)\b")
 """What may stand between such a word and the noun."""
 SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
 """Words for a measure that no noun need follow."""
 SYMBOL_AFTER = re.compile(r" [abdhls]_?[0o]$")
 """That of a size in standards, after its name."""
-MEASURED_ALONG = re.compile(r"(?<=messlange) (?P<way>.+)")
-"""What is measured along a gauge length, as in ``Messlänge Standardweg``."""
+MEASURED_ALONG = re.compile(r"(?:(?<=messlange)|(?<=gage length)|(?<=gauge length)|(?<=\bl0)),? (?P<way>.+)")
+"""What is measured along a gauge length, as in ``Messlänge Standardweg`` and ``L0 - course standard``."""
 
 
 ROLES_AND_SIZES = frozenset(["size"]).union(*(names for role, names in ROLES.items() if role not in ROLES_OF_TUBE))
@@ -133,7 +138,9 @@ class Heading:
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = DIRECTION_IN_BRACKETS.sub("", CHANNEL.sub("", name))
+    if force := FORCE_IN_SMALL_LETTERS.fullmatch(name.strip()):
+        return Heading(plain(force["quantity"]), NEWTONS[force["unit"]])
+    name = PERCENT_BEFORE.sub(r"\1 (%)", DIRECTION_IN_BRACKETS.sub("", CHANNEL.sub("", name)))
     if formula := FORMULA.fullmatch(name.strip()):
         quantity = FORMULAS.get(re.sub(r"[\s_]", "", formula["quantity"]).lower())
         if quantity:
@@ -205,7 +212,8 @@ def contents_of(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, s
     quantities = [without_correction(quantity) for quantity in stated]
     corrected = {name for name, quantity in zip(quantities, stated, strict=True) if name != quantity}
     for column, (name, unit) in enumerate(zip(quantities, units, strict=True)):
-        if stated[column] in corrected:
+        is_share_of_length = name in ROLES["length"] and measured_in(unit) == "strain"
+        if stated[column] in corrected or is_share_of_length:
             quantities[column] = ""
         elif DEFORMATION_GRADIENT.fullmatch(name) and (not unit or measured_in(unit) == "strain"):
             quantities[column] = DEFORMATION_GRADIENT.sub(r"stretch \1", name)

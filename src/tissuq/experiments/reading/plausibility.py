@@ -21,6 +21,7 @@ __all__ = [
     "ZERO_ASSUMED",
     "check_lengths",
     "check_positions",
+    "check_shear",
     "check_strain",
     "check_stretches",
     "poisson_ratio",
@@ -34,7 +35,7 @@ DOUBTFUL_STRAIN = 1.0
 """A strain without a unit beyond this (100 %) may be percent; it is taken for a plain ratio with a warning."""
 RATIO_ASSUMED = "(a plain ratio assumed: the file states no unit)"
 COMPRESSED_LIMIT = 0.5
-"""Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
+"""Stretches that all lie below this, or that do in tension where its stress is least, are taken for strains."""
 FIRST_ROW = "first"
 """What is given for a zero at the first row."""
 ZERO_ASSUMED = "(its first row, assumed: there is little load)"
@@ -64,9 +65,12 @@ INDEPENDENT_ROWS = 10
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
     """Refuse columns of stretches that are not positive, or that are strains by their size."""
     table = measured.table
-    for choice, stretch in zip(choices, measured.stretch, strict=True):
+    for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
-        if choice.measure in SHEARS or (is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT)):
+        at_rest, below_1 = stretch[np.argmin(np.abs(stress))], stretch < 1
+        is_pulled = choice.measure == "stretch" and below_1.any() and np.median(stress[below_1]) > 0
+        is_small = stretch.max() < COMPRESSED_LIMIT or (is_pulled and at_rest < COMPRESSED_LIMIT)
+        if choice.measure in SHEARS or (is_positive and (is_strain or not is_small)):
             continue
         name = table.key(choice.deformation)
         if is_strain:
@@ -74,12 +78,12 @@ def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> 
         else:
             advice = (
                 "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
-                f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
+                f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}; or call it so in the file.'
             )
         if is_positive:
             raise InputError(
-                f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
-                f"{stretch.max():g}) look like strain, not stretch. {advice}"
+                f"{table.place(choice.deformation)}: its values ({stretch.min():g} to {stretch.max():g}, and "
+                f"{at_rest:g} where the stress is least) look like strain, not stretch. {advice}"
             )
         row = int(np.flatnonzero(stretch <= 0)[0])
         raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
@@ -94,15 +98,30 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
             f"{table.place(column, row)}: strain {strain[row]:g} without a unit would be {100 * strain[row]:.0f} %. "
             'Give strain_unit="%" (--strain-unit %) if it is percent, strain_unit="1" if it is a plain ratio.'
         )
-    start = int(np.argmin(np.abs(strain - 1.0)))
-    starts_at_one = abs(strain[start] - 1.0) < 0.02 and abs(stress[start]) <= 0.02 * np.abs(stress).max()
-    if starts_at_one and np.abs(strain).min() > 0.2:
+    if (start := _rest_at_one(strain, stress)) is not None:
         name = table.key(column)
         raise InputError(
             f"{table.place(column, start)}: at strain {strain[start]:g} there is no stress, and the column "
             f'never comes near 0: it looks like a stretch. Say so: columns={{"stretch": "{name}"}} or '
             f"--column stretch={_quoted(name)}."
         )
+
+
+def check_shear(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
+    """Refuse a column of amounts of shear that are 1 where there is no stress."""
+    if (start := _rest_at_one(shear, stress)) is not None:
+        raise InputError(
+            f"{table.place(choice.deformation, start)}: at an amount of shear of {shear[start]:g} there is no stress, "
+            "and the column never comes near 0. If 1 was added to it, take that off; if it is a stretch, give the mode "
+            "in which the specimen was stretched, such as --mode planar, and the column as stretch."
+        )
+
+
+def _rest_at_one(deformation: Column, stress: Column) -> int | None:
+    """Return the row of a deformation of 1 where that carries no stress, of one that never comes near 0."""
+    start = int(np.argmin(np.abs(deformation - 1.0)))
+    starts_at_one = abs(deformation[start] - 1.0) < 0.02 and abs(stress[start]) <= 0.02 * np.abs(stress).max()
+    return start if starts_at_one and np.abs(deformation).min() > 0.2 else None
 
 
 def _quoted(name: str) -> str:

@@ -48,9 +48,11 @@ OTHER_MEASURE = (
 """Within names of a strain or stress that is, or may be, another one than the engineering one."""
 NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
+FEWEST_SPECIMENS = 2
+"""Columns whose names are not known that may be of as many specimens."""
 IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력|давлени")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|tijd|时间|時間|시간|время|температур|модул|энерги|скорост|温度|模量|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
+    r"modul|time|zeit|czas|temp|tijd|时间|時間|시간|время|температур|модул|энерги|скорост|温度|模量|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
     + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
@@ -161,10 +163,10 @@ def recognise(
     """Return the one column whose name says that it has one of the candidate roles, of those that it may have."""
     columns = contents.fitting(*candidates)
     if len(columns) > 1:
-        raise ambiguous(table, candidates, columns)
+        raise ambiguous(table, [_role_among(table, contents, candidates, column) for column in columns], columns)
     if not columns:
         by_role = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
-        hint = by_role or _of_other_quantities(table, roles)
+        hint = by_role or _of_other_quantities(table, roles) or _several_hint(table, contents, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
         of_roles = (
@@ -180,6 +182,12 @@ def recognise(
             f"{columns_there_are(table)} {_how_to_say(table, in_order)}"
         )
     return columns[0]
+
+
+def _role_among(table: Table, contents: Contents, candidates: Sequence[str], column: int) -> str:
+    """Return which of the candidate roles a column has by its name; a displacement over a length is a strain."""
+    role = next((role for role in candidates if contents.quantities[column] in ROLES[role]), candidates[0])
+    return "strain" if role == "displacement" and measured_in(table.unit(column)) == "strain" else role
 
 
 def _of_other_quantities(table: Table, roles: Sequence[str]) -> str:
@@ -210,6 +218,20 @@ def _stress_hint(table: Table, contents: Contents) -> str:
     return ""
 
 
+def _several_hint(table: Table, contents: Contents, roles: Sequence[str]) -> str:
+    """Return how columns of several specimens are given, where they stand beside one another and one deformation."""
+    deformations = contents.fitting(*LENGTHENINGS, "shear")
+    by_unit = _by_unit(table, table.quantities)
+    columns = sorted({*by_unit.get("", []), *by_unit.get("stress", [])} - {*deformations})
+    are_beside = columns == [*range(columns[0], columns[-1] + 1)] if columns else False
+    if "stress" not in roles or len(deformations) != 1 or len(columns) < FEWEST_SPECIMENS or not are_beside:
+        return ""
+    return (
+        f" If columns {columns[0] + 1} to {columns[-1] + 1} hold the stresses of several specimens, give "
+        f"--column stress={columns[0] + 1}:{columns[-1] + 1} and --stress-unit."
+    )
+
+
 def say_which(kind: str) -> str:
     """Return how to say which measure of strain or stress a column is."""
     strains = [name for name, measure in STRAIN_MEASURES.items() if measure.stretch]
@@ -238,7 +260,7 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
         columns = [column for column, name in enumerate(names) if name and name == key]
         if len(columns) > 1:
-            raise ambiguous(table, [role], columns)
+            raise ambiguous(table, [role] * len(columns), columns)
         if columns:
             return columns[0]
     if text.isdecimal() and 1 <= int(text) <= len(table.names):
@@ -251,10 +273,11 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
 
 
 def ambiguous(table: Table, roles: Sequence[str], columns: Sequence[int]) -> InputError:
-    """Return that several columns may have a role, and how to say which has it."""
+    """Return that several columns may be read, each in its role, and how to say which is."""
     fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in columns)
+    distinct = list(dict.fromkeys(roles))
     return InputError(
-        f"{table.file}: several columns may be the {roles[0]}: {fitting}. {_how_to_say(table, roles[:1])}"
+        f"{table.file}: several columns may be the {' or '.join(distinct)}: {fitting}. {_how_to_say(table, distinct)}"
     )
 
 
@@ -268,8 +291,10 @@ def columns_there_are(table: Table) -> str:
 
 def _how_to_say(table: Table, roles: Sequence[str]) -> str:
     if not any(table.names):
+        deformation = "shear" if {*SHEARS, "torque"} & {*roles} else "stretch"
         return (
-            'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
+            f'Say by number which is which: columns={{"{deformation}": 1, "stress": 2}} or --column {deformation}=1 '
+            "--column stress=2."
         )
     more = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
     return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{more}.'

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.experiments.reading.columns_of_tube import mode_of_tube
@@ -22,10 +24,12 @@ __all__ = [
     "DEFAULT_SOURCE",
     "GIVEN",
     "about_mode",
+    "check_not_inflated",
     "check_not_sheared",
     "comment_on_mode",
     "direction_of",
     "find_mode",
+    "is_named_by_mode",
     "is_torque",
     "mode_in_comment",
     "mode_of",
@@ -40,6 +44,17 @@ MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "axial": "uniaxi
 """Words for loading modes beside their names."""
 NAMES_OF_MODES = {"pure-shear": "planar"}
 """Further names of loading modes."""
+ABBREVIATIONS = {
+    **dict.fromkeys(["ut", "uc", "ux"], "uniaxial"),
+    **dict.fromkeys(["et", "eb", "ebt", "ebx"], "equibiaxial"),
+    "ps": "planar",
+    "ss": "simple-shear",
+}
+"""What modes are called in tables: uniaxial tension, pure shear and so on. Such letters may mean anything elsewhere."""
+LONGEST_ABBREVIATION = 3
+"""Capital letters."""
+ABBREVIATED = re.compile(r"(?<![^\W_])(ET|EBT?|EBX|PS)(?![^\W_])")
+"""Those of modes that are not read unless said, within the name of a file or a sheet."""
 AXIS_2 = "@2"
 """After the name of a mode: of a specimen along axis 2 of the tissue."""
 NAMES_OF_COLUMN = frozenset({"mode", "loading mode", "mode of loading", "deformation mode", "test mode"})
@@ -50,6 +65,13 @@ OF_MACHINE = re.compile(
     re.IGNORECASE,
 )
 """Lines that name a machine or a file of its settings, such as ``Biaxial.cfg``, and not what was done with it."""
+MEANT = {
+    "biaxial": " If both axes were stretched alike, call it equibiaxial.",
+    "simple-shear": " If it is pure shear, of a wide strip that was pulled, call it planar.",
+}
+"""What a mode may be that words of files name so."""
+RISES_WITH, PRESSURE_RISES = 0.9, 0.2
+"""Correlation of a stress and a pressure beyond which one comes from the other, and by which share that rises."""
 CONFINED = re.compile(r"(^|-)confined($|-)")
 """Words for compression between walls, which no loading mode is."""
 RHEOMETER = re.compile(
@@ -63,10 +85,10 @@ OF_RHEOMETER = re.compile(
 """Names of columns that a rheometer writes beside strain and stress."""
 DIRECTIONS_OF_LOAD = {
     "compression": re.compile(
-        r"compress|(?<![a-z])compr(?![a-z])|compresi|(?<![^\W_])druck|stauch|压缩|压应|圧縮|압축|сжати|сжим"
+        r"compress|(?<![a-z])compr(?![a-z])|compresi|(?<![^\W_])druck|stauch|压缩|压应|圧縮|압축|сжати|сжим|ściskan"
     ),
     "tension": re.compile(
-        r"(?<![a-z])tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени"
+        r"(?<![a-z])tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени|rozciągan"
     ),
 }
 """Words for the direction of a load."""
@@ -118,6 +140,7 @@ def mode_of(
         return wanted, GIVEN
     mode, source, is_by_word = "", "", False
     for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
+        _check_modes_in_column(table, column)
         if len(modes := modes_in_column(table, column)) == 1:
             mode, source = modes.pop(), f"column {table.label(column)}"
             break
@@ -134,7 +157,20 @@ def mode_of(
         mode, source = "inflated-tube", "an axial stretch"
     if not (mode or columns or options.get("axis")):
         mode, source = _mode_of_columns(table)
+    if not mode:
+        _check_abbreviations(table, Path(file).stem, table.sheet)
     return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
+
+
+def _check_abbreviations(table: Table, *names: str) -> None:
+    """Ask about a name in which letters stand that may abbreviate a loading mode, as in ``Treloar_PS``."""
+    for name in names:
+        if letters := ABBREVIATED.search(name):
+            mode = ABBREVIATIONS[letters[0].lower()]
+            raise InputError(
+                f"{table.file}: {letters[0]} in '{name}' may mean the loading mode {mode}, and nothing else says one. "
+                f"If it does, give --mode {mode}; if not, --mode {DEFAULT_MODE}, or another."
+            )
 
 
 def modes_in_column(table: Table, column: int) -> set[str]:
@@ -142,6 +178,17 @@ def modes_in_column(table: Table, column: int) -> set[str]:
     if table.quantities[column] not in NAMES_OF_COLUMN:
         return set()
     return {_mode_of_words(cell) for cell in set(table.texts(column))} - {""}
+
+
+def _check_modes_in_column(table: Table, column: int) -> None:
+    """Refuse a column that tells the modes, and abbreviates one that is not known."""
+    cells = sorted(set(table.texts(column))) if table.quantities[column] in NAMES_OF_COLUMN else []
+    for cell in cells:
+        if cell.isupper() and len(cell) <= LONGEST_ABBREVIATION and not _mode_of_words(cell):
+            raise InputError(
+                f"{table.place(column)}: '{cell}' is no loading mode that is known. Write the mode there, such as "
+                "uniaxial, equibiaxial, planar or simple-shear (tissuq modes lists them), or give --mode."
+            )
 
 
 def direction_of(*texts: str) -> str:
@@ -155,6 +202,19 @@ def direction_of(*texts: str) -> str:
     said = [{name for name, words in DIRECTIONS_OF_LOAD.items() if words.search(text.lower())} for text in texts]
     last = next((names for names in reversed(said) if names), set())
     return last.pop() if len(last) == 1 else ""
+
+
+def is_named_by_mode(text: str) -> bool:
+    """Return whether words are those of a loading mode alone, as what tells tests apart.
+
+    Examples
+    --------
+    >>> is_named_by_mode("pure shear"), is_named_by_mode("ut"), is_named_by_mode("axial")
+    (True, True, False)
+    """
+    words = text.lower().split()
+    of_modes = {*ABBREVIATIONS, "tension", "compression", "pure"}.union(*(name.split("-") for name in loading_modes()))
+    return bool(words) and of_modes.issuperset(words)
 
 
 def is_torque(name: str) -> bool:
@@ -174,6 +234,21 @@ def check_not_sheared(table: Table) -> None:
         )
 
 
+def check_not_inflated(table: Table, stress: int) -> None:
+    """Ask about a stress that rises with a pressure beside it where nothing says the mode: a wall was inflated."""
+    for column, quantity in enumerate(table.quantities):
+        if column == stress or quantity not in ROLES["pressure"] or not table.varies(column):
+            continue
+        pressures, stresses = table.without_missing([column, stress]).numbers([column, stress])
+        rises = np.ptp(pressures) > PRESSURE_RISES * np.abs(pressures).max() and np.ptp(stresses) > 0
+        if rises and np.corrcoef(pressures, stresses)[0, 1] > RISES_WITH:
+            raise InputError(
+                f"{table.place(stress)} rises with the pressure {table.label(column)}: if that stretched the specimen, "
+                "say in which loading mode it was, such as --mode equibiaxial (a membrane that bulges) or planar (a "
+                f"tube that keeps its length); if it was pulled, --mode {DEFAULT_MODE}."
+            )
+
+
 @contextmanager
 def about_mode(mode: str, source: str) -> Iterator[None]:
     """Add to what is wrong with the columns where the file's loading mode comes from, unless it was given."""
@@ -182,7 +257,10 @@ def about_mode(mode: str, source: str) -> Iterator[None]:
     except InputError as error:
         if not mode or source in ("", GIVEN, DEFAULT_SOURCE):
             raise
-        raise InputError(f"{error} (The loading mode {mode} is from {source}; give --mode for another.)") from error
+        meant = MEANT.get(mode, "")
+        raise InputError(
+            f"{error} (The loading mode {mode} is from {source}; give --mode for another.{meant})"
+        ) from error
 
 
 def _mode_of_columns(table: Table) -> tuple[str, str]:
@@ -222,7 +300,9 @@ def comment_on_mode(file: Path) -> str:
 
 
 def _mode_of_words(text: str) -> str:
-    """Return the loading mode that words name; an empty text for none, or several."""
+    """Return the loading mode that words name, or that they abbreviate; an empty text for none, or several."""
+    if abbreviated := ABBREVIATIONS.get(text.strip().lower()):
+        return abbreviated
     words = "-".join(re.findall(r"[a-z]+", NEXT_WORD.sub(" ", text).lower()))
     names = dict.fromkeys(loading_modes()) | NAMES_OF_MODES
     for name in sorted(names, key=len, reverse=True):

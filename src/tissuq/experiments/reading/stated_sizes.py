@@ -24,8 +24,8 @@ UNIT_ASSUMED = "as of displacements)"
 UNIT = r"(?:mm|cm|um|µm|мм|см|мкм|毫米|厘米)[2²]?"
 UNITS = rf"(?P<unit>{UNIT})"
 """Of sizes, where they stand among other words."""
-BETWEEN_STATEMENTS = re.compile(rf";|,\s+(?=[^\W\d])(?!{UNIT}\s*[:=])")
-"""As in ``Width 5 mm; thickness 2 mm``, but not in ``Width, mm: 5``."""
+BETWEEN_STATEMENTS = re.compile(rf";|(?<!age length)(?<!auge length),\s+(?=[^\W\d])(?!{UNIT}\s*[:=])")
+"""As in ``Width 5 mm; thickness 2 mm``, but not in ``Width, mm: 5`` and ``Gage length, standard travel``."""
 ASSIGNMENT = r"[:=\t]"
 BETWEEN_WORDS = re.compile(
     rf"{ASSIGNMENT}|\s{{2,}}|(?<=\w)(?<! x)\s+(?={NUMBER.pattern}\s*[\[(]?{UNIT}|{PRODUCT.pattern}\s*(?:{UNIT}|$))"

@@ -130,8 +130,8 @@ class Table:
         return beneath or in_heading
 
     def is_constant(self, column: int) -> bool:
-        """Tell whether a column (counted from 0) has the same cell, or no number, in some rows all along."""
-        cells = set(self.some_rows(FEW_ROWS).texts(column))
+        """Tell whether a column (counted from 0) has the same cell, or no number, in some rows that are not empty."""
+        cells = set(self.some_rows(FEW_ROWS).texts(column)) - {""}
         return len(cells) < 2 or not any(NUMBER.fullmatch(cell) for cell in cells)
 
     def varies(self, column: int) -> bool:

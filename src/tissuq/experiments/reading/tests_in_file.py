@@ -16,6 +16,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.reading.column_checks import check_machine
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
@@ -226,6 +227,10 @@ def _side_by_side(
         with about_mode(mode.name, source):
             choose_columns(table, mode, options)
         return [None]
+    if not columns:
+        (measure, deformation), (load, stress) = tests[0].columns.items()
+        given = f' --column {load}="{table.names[int(stress) - 1]}"'
+        check_machine(table, table.quantities, int(deformation) - 1, measure, given)
     return list(tests)
 
 

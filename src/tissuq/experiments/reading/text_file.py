@@ -19,18 +19,29 @@ NOT_TEXT = {
     b"<?xml": "an XML document",
 }
 CHINESE_WORD = re.compile(r"[\u4e00-\u9fff]{2,}")
+KOREAN_WORD = re.compile(
+    f"[{bytes(byte for a in range(0xB0, 0xC9) for b in range(0xA1, 0xFF) for byte in (a, b)).decode('euc_kr')}]{{2,}}"
+)
+"""Of the syllables that are in use."""
+POLISH_WORD = re.compile(r"(?<!\w)(?=[^\W\d_]{3,})[^\W\d_]*(?:[łżźąŁŻ]|[śŚ](?=[cćlmnrw]))[a-ząćęłńóśźż]+(?!\w)")
+"""One with a letter of its own before others: the power of cm³ ends a word, and œ is before others in French."""
 JAPANESE_WORD = re.compile(r"[\u3040-\u30fa\u30fc\u4e00-\u9fff]{2,}")
 RUSSIAN_WORD = re.compile(r"(?<!\w)(?:[А-ЯЁ]?[а-яё]{2,}|[А-ЯЁ]{2,}|[кмМГ]?(?:Н|Па))(?!\w)")
 """One in capitals, in small letters, or with a capital first, as letters of another alphabet hardly make one."""
 LANGUAGES = {
+    "cp1250": (POLISH_WORD, "łśżźąćęńóŁŚŻĆÓ".encode("cp1250")),
     "cp932": (JAPANESE_WORD, range(0x81, 0x99)),
+    "cp949": (KOREAN_WORD, range(0xB0, 0xC9)),
     "gb18030": (CHINESE_WORD, range(0xB0, 0xD8)),
     "big5": (CHINESE_WORD, range(0xA4, 0xC7)),
     "cp1251": (RUSSIAN_WORD, range(0xA8, 0x100)),
     "cp866": (RUSSIAN_WORD, range(0x80, 0xF2)),
     "koi8-r": (RUSSIAN_WORD, range(0xA3, 0x100)),
 }
-"""Encodings of other alphabets than Western Europe's: their words, and the first bytes of their usual characters."""
+"""Encodings of other alphabets than Western Europe's: their words, and the first bytes of their usual characters.
+
+Of those that fit alike the first one is taken: Chinese texts hardly keep to the bytes of Korean ones.
+"""
 SHARE_OF_WORDS = 0.25
 """Usual characters in such words over those beyond ASCII, at least."""
 LINES_FOR_ENCODING = 200
@@ -48,8 +59,8 @@ LONGEST_LINE = 100_000
 def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """Return the lines of a text file, numbered as an editor shows them, without their ends.
 
-    UTF-8 (with or without byte order mark), UTF-16, Shift-JIS, GB18030, Big5, Cyrillic and Windows/Latin-1 are
-    told apart by their bytes.
+    UTF-8 (with or without byte order mark), UTF-16, Shift-JIS, EUC-KR, GB18030, Big5, Cyrillic, Windows/Latin-1 and
+    Polish Windows are told apart by their bytes.
 
     Raises
     ------
@@ -125,7 +136,10 @@ def _share_of_words(content: bytes, encoding: str) -> float:
     Bytes that begin these characters are no letters in Western Europe, or hardly stand there beside one another.
     """
     words, first_bytes = LANGUAGES[encoding]
-    text = content.decode(encoding, errors="replace")
+    try:
+        text = content.decode(encoding)
+    except UnicodeDecodeError:
+        return 0.0
     characters = "".join(words.findall(text))
     count = sum(letter.encode(encoding)[0] in first_bytes for letter in characters)
     return count / max(1, sum(not letter.isascii() for letter in text))

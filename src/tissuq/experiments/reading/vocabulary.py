@@ -33,19 +33,20 @@ __all__ = [
 
 ACCENTS = re.compile(r"(?<=[A-Za-z])[\u0300-\u036f]+")
 """Accents of Latin letters, where these are written apart from them."""
-UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "ё": "е"})
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "ё": "е", "ł": "l"})
 """How keyboards without them write umlauts and their like."""
 
 OTHER_QUANTITIES = {
-    "a modulus": r"modul|^[ge]('|\"|′|″|\*)?$|^young",
+    "a modulus": r"modu[lł]|^[ge]('|\"|′|″|\*)?$|^young",
     "a stiffness": r"stiff|steif|rigid|raideur|rigidez|rigidezza|жесткост|刚度|剛性",
     "a hardness": r"hardness|härte|duret|dureza|durezza|твердост|硬度|硬さ",
-    "a strength": r"strength|festigkeit|résistance|resistencia|resistenza|прочност|强度|強度",
+    "a strength": r"strength|festigkeit|résistance|resistencia|resistenza|прочност|强度|強度|wytrzymałoś",
     "a stress or strain at yield": r"yield|streckgrenze|dehngrenze|fließ|текучест|屈服|降伏",
     "a largest value, and no curve": r"\bpeak\b|\bultimate\b|\bmaximum\b|\bmaximal\b|\bmax\b",
+    "a smallest value, and no curve": r"\bminimum\b|\bminimal\b|\bmin\b",
     "a value at failure, and no curve": r"\b(fracture|failure|rupture|break(ing)?)\b|bruch",
     "a range or a difference": r"\brange\b|difference|differenz|invariant",
-    "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|theor|berechnet",
+    "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|\bsim\b|\bfe[am]\b|theor|berechnet",
     "a load before the test": r"\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
     "an amplitude, and no curve": r"amplitud|амплитуд|振幅",
     "what was asked of the machine, and not measured": r"set ?point|command|demand|sollwert",
@@ -96,7 +97,8 @@ def names_of(text: str) -> frozenset[str]:
 
 ROLES = {
     "stretch": names_of(
-        "stretch, stretch ratio, extension ratio, lambda, λ, streckung, étirement, estiramiento, stiramento, "
+        "stretch, stretch ratio, extension ratio, elongation ratio, draw ratio, "
+        "lambda, λ, streckung, étirement, estiramiento, stiramento, "
         "степень растяжения, степень удлинения, кратность растяжения, кратность удлинения, коэффициент растяжения, "
         "拉伸比, 伸长比, 伸張比"
     ),
@@ -106,7 +108,8 @@ ROLES = {
         "epsilon, ε, déformation, deformación, deformação, deformazione, rek, töjning, tøyning, 应变, 應變, ひずみ, "
         "歪み, 歪, 변형률, деформация, деформация растяжения, деформация сжатия, осевая деформация, "
         "продольная деформация, "
-        "удлинение при растяжении, 延伸率, 伸长率"
+        "удлинение при растяжении, 延伸率, 伸长率, 拉伸应变, 压缩应变, 名义应变, 引張ひずみ, 圧縮ひずみ, 公称ひずみ, "
+        "인장 변형률, 압축 변형률, odkształcenie, odkształcenie względne, wydłużenie względne"
     ),
     "shear": names_of(
         "shear, amount of shear, shear strain, gamma, γ, scherung, schiebung, scherdeformation, cisaillement, "
@@ -132,14 +135,18 @@ ROLES = {
         "displacement, disp, compression, uzama, yer değiştirme, "
         "axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
-        "axial position, crosshead position, stroke, travel, traverse, déplacement, allongement, desplazamiento, "
+        "axial position, crosshead position, crosshead travel, cross head travel, stroke, travel, traverse, "
+        "déplacement, allongement, desplazamiento, "
         "alargamiento, deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
-        "位移, 變位, 変位, 伸び, 伸长, 변위, 變形量, 变形, 变形量, 伸长量, 拉伸位移, 横梁位移, 夹头位移, "
+        "位移, 變位, 変位, 伸び, ストローク, 伸长, 변위, 스트로크, 變形量, 变形, 变形量, 伸长量, "
+        "拉伸位移, 压缩位移, 横梁位移, 夹头位移, "
+        "standard travel, course, course standard, przemieszczenie, wydłużenie, droga, "
         "перемещение, смещение, удлинение, абсолютное удлинение, укорочение, осадка, ход, ход траверсы, ход поршня, "
         "перемещение траверсы, перемещение захвата, положение, положение траверсы, позиция"
     ),
     "length": names_of(
         "marker distance, marker separation, distance between markers, distance of markers, markerabstand, "
+        "grip distance, grip separation, grip to grip separation, distance between grips, clamp distance, "
         "distance entre marqueurs, distancia entre marcadores, 标记间距, gap, gap width, gap height, height, "
         "sample height, specimen height, current length, current height, spalt, "
         "spaltweite, höhe, probenhöhe, зазор, высота, высота образца, текущая длина, текущая высота, 间隙, 間隙, すき間"
@@ -152,7 +159,8 @@ ROLES = {
         "kraft pro breite, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, "
         "forza di taglio, effort, charge, fuerza, carga, força, forza, carico, kracht, belasting, "
         "reduced force, reduced axial force, transducer force, axial transducer force, "
-        "力, 载荷, 荷重, 试验力, 試験力, 하중, 负荷, 負荷, 負載, 负载, 拉力, 拉伸力, 力值, "
+        "standard force, force standard, siła, obciążenie, "
+        "力, 载荷, 拉伸载荷, 压缩载荷, 荷重, 试验力, 試験力, 하중, 负荷, 負荷, 負載, 负载, 拉力, 拉伸力, 力值, "
         "сила, усилие, нагрузка, осевая сила, осевое усилие, осевая нагрузка, растягивающая сила, сжимающая сила, "
         "растягивающее усилие, сжимающее усилие, нормальная сила, сила сдвига, сдвиговая сила, поперечная сила, "
         "剪切力, せん断力"
@@ -171,7 +179,9 @@ ROLES = {
         "spannung, zugspannung, druckspannung, schubspannung, nennspannung, nominelle spannung, "
         "contrainte, tensión, esfuerzo, tensão, tensione, sforzo, spanning, spänning, 应力, 應力, 応力, 응력, "
         "напряжение, осевое напряжение, напряжение растяжения, растягивающее напряжение, напряжение сжатия, "
-        "сжимающее напряжение, напряжение сдвига, касательное напряжение, 拉应力, 拉伸应力, 压应力, 剪切应力, 剪应力, "
+        "сжимающее напряжение, напряжение сдвига, касательное напряжение, 拉应力, "
+        "拉伸应力, 压应力, 压缩应力, 名义应力, 公称応力, 인장 응력, 압축 응력, naprężenie, naprężenie rozciągające, "
+        "naprężenie ściskające, 剪切应力, 剪应力, "
         "引張応力, 圧縮応力, せん断応力"
     ),
     "outer_diameter": names_of(
@@ -294,18 +304,20 @@ DIMENSION_NAMES = {
         "área da secção, área da seção transversal, área da secção transversal, sezione, sezione trasversale, "
         "area della sezione, area della sezione trasversale, doorsnede, dwarsdoorsnede, "
         "oppervlakte van de doorsnede, 横截面积, 截面积, 橫截面積, 截面積, 面积, 面積, 断面積, 原断面積, "
+        "przekrój, pole przekroju, pole przekroju poprzecznego, "
         "площадь, сечение, поперечное сечение, площадь сечения, площадь поперечного сечения"
     ),
     "width": names_of(
         "width, b0, breite, probenbreite, largeur, anchura, ancho, largura, larghezza, breedte, 宽度, 寬度, 幅, 板幅, "
-        "ширина"
+        "szerokość, ширина"
     ),
     "thickness": names_of(
         "thickness, a0, dicke, probendicke, épaisseur, espesor, grosor, espessura, spessore, dikte, 厚度, 厚さ, 板厚, "
-        "толщина"
+        "grubość, толщина"
     ),
     "diameter": names_of(
-        "diameter, d0, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, диаметр"
+        "diameter, d0, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, "
+        "średnica, диаметр"
     ),
     "length": names_of(
         "length, gauge length, gage length, l0, grip separation, grip to grip separation, distance between grips, "
@@ -316,6 +328,7 @@ DIMENSION_NAMES = {
         "lunghezza di riferimento, lunghezza tra i riferimenti, distanza tra gli afferraggi, lengte, "
         "meetlengte, beginlengte, inklemlengte, 标距, 标距长度, 標距, 长度, 長度, 夹具间距, "
         "標点距離, 標点間距離, 原標点距離, 長さ, つかみ具間距離, チャック間距離, ゲージ長, "
+        "długość, długość pomiarowa, "
         "длина, рабочая длина, расчётная длина, измерительная длина, зажимная длина, база, измерительная база, "
         "база экстензометра, расстояние между захватами, расстояние между зажимами"
     ),
@@ -323,7 +336,7 @@ DIMENSION_NAMES = {
 """What the sizes of specimens are called, in the words of testing standards, without those in `OF_SPECIMEN`."""
 
 
-HEIGHT_NAMES = names_of("height, h0, höhe, probenhöhe, hauteur, altura, altezza, hoogte, 高度, 高さ, высота")
+HEIGHT_NAMES = names_of("height, h0, höhe, probenhöhe, hauteur, altura, altezza, hoogte, 高度, 高さ, wysokość, высота")
 """What the length of a cylinder or a disc is called; of other specimens it may be the thickness."""
 
 
@@ -333,7 +346,7 @@ OF_SPECIMEN = re.compile(
     r"\b(bei startposition|zu beginn|at (the )?(start|beginning)|before (the )?test)\b|"
     r"\b(initiale?|initieel|inicial|iniziale|original|undeformed|(mean|average)(?! diameter))\b|"
     r"原始|初始|初期|试样|試樣|試験片|样品|の|"
-    r"\b(перво)?начальн(ая|ый|ое)\b|\bисходн(ая|ый|ое)\b|\b(образца|пробы)\b"
+    r"\b(перво)?начальн(ая|ый|ое)\b|\bисходн(ая|ый|ое)\b|\b(образца|пробы)\b|\b(probki|poczatkow[aey])\b"
 )
 """Words beside the name of a size that leave it what it is, without accents; a mean diameter is that of a tube."""
 
