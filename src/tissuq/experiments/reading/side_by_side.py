@@ -139,10 +139,10 @@ def columns_named_again(table: Table, columns: Mapping[str, str | int]) -> list[
     loads = [number - 1 for role in LOADS for number in by_role.get(role, [])]
     if len(counts) != 1 or 0 in counts or len(loads) not in counts:
         return []
-    own, groups = [table.names[load] for load in loads], names_above(table, loads, are_distinct=False)
-    in_groups = [" ".join(words) for words in zip(groups, own, strict=False)]
+    headings, groups = [table.names[load] for load in loads], names_above(table, loads, are_distinct=False)
+    in_groups = [" ".join(words) for words in zip(groups, headings, strict=False)]
     numbers_of_tests = [str(number) for number in range(1, len(loads) + 1)]
-    options = (names_above(table, loads), own if all(own) else [], in_groups)
+    options = (names_above(table, loads), headings if all(headings) else [], in_groups)
     names = next((names for names in options if names and len(set(names)) == len(names)), numbers_of_tests)
     return [
         ColumnsOfTest(name, {role: numbers[k % len(numbers)] for role, numbers in by_role.items()})
