@@ -55,6 +55,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "poorly-determined": "The data determine the headline parameter poorly.",
         "one-direction": "There is tension or compression only.",
         "no-direction-looked-for": "A preferred direction is not looked for, because a test measured one axis alone.",
+        "inseparable-parameters": "Other parameters of the material give the same stresses in the measured tests.",
         "inseparable-noise": "The data cannot separate noise from discrepancy.",
     }
 )

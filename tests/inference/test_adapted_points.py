@@ -57,8 +57,25 @@ def test_three_exponents_are_summed(discrepancy):
 def test_a_similar_posterior_is_found_from_the_last_one():
     points, problem = AdaptedPoints(), model(material="ogden-1", discrepancy="none")
     first, again = (points.solve([problem])[0] for _ in range(2))
-    assert points.proposal is not None
+    assert points.start is not None
     assert again.log_evidence == pytest.approx(first.log_evidence, abs=0.15)
+
+
+def test_points_lie_around_the_highest_peak_and_not_around_the_first_that_is_met():
+    """Strips along both axes: fibres along axis 2 explain them, too, with a chi-square 10 above that of this angle."""
+    law = "holzapfel-gasser-ogden"
+    truth = {"C10": 0.0139, "k1": 0.018, "k2": 1.82, "phi": 1.1}
+    noise = np.random.default_rng(103).standard_normal(28)[4:]  # with which points had settled at an angle of 1.43
+    stretch = np.linspace(1.03, 1.35, 12)
+    strips = [
+        tq.Experiment(mode, stretch, tq.simulate(law, truth, stretch, mode=mode).stress + 4e-4 * errors)
+        for mode, errors in zip(("uniaxial", "uniaxial@2"), noise.reshape(2, 12), strict=True)
+    ]
+    posterior = tq.fit(strips, material=law, discrepancy="none", noise_sd=4e-4, tolerances="as-tested")
+    assert posterior.solution.reason.startswith("C10 integrated in closed form; a sum over")
+    assert posterior.log_evidence == pytest.approx(133.05, abs=0.3)
+    assert posterior.marginals["phi"].quantile(0.5) == pytest.approx(0.99, abs=0.03)
+    assert posterior.marginals["k2"].hdi()[1] > 2.65
 
 
 def test_points_that_are_not_effective_are_said(monkeypatch):

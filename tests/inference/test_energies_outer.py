@@ -10,7 +10,7 @@ from scipy.stats import halfcauchy
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.outer_search import relative_error
+from tissuq.inference.enumerators.outer_search import Guide, relative_error, weighted_nodes
 from tissuq.inference.linear import times_gaussians
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points, log_normal
 from tissuq.model.noise import stress_level
@@ -140,6 +140,27 @@ def test_energies_take_materials_with_exponents(discrepancy, material):
     assert modulus.std() < 0.1
     assert posterior.predictive_coverage() > 0.8
     assert "effective" in posterior.solution.reason
+
+
+def test_points_begin_anew_where_those_of_a_similar_model_lead_nowhere(monkeypatch):
+    """Of brain with two exponents, 2 of 360 values were effective at one noise, and there was no answer."""
+    model = fit(material="ogden-1", noise_sd=NOISE_SD, priors={"mu1": tq.LogNormal(1.0, 0.5)}).model
+    astray, starts = Proposal(np.array([2.0, -2.0]), 1e-4 * np.eye(2)), []
+
+    def adapted_unless_astray(log_density, dimension, count=None, **options):
+        starts.append(options.get("start"))
+        adaptation = adapted(log_density, dimension, count, **options)
+        return adaptation._replace(is_settled=False) if starts[-1] is astray else adaptation
+
+    monkeypatch.setattr("tissuq.inference.enumerators.outer_search.adapted", adapted_unless_astray)
+    guide, masses = Guide(proposal=astray), []
+    for search in (guide, Guide()):
+        nodes, log_weights, error = weighted_nodes(model, search)
+        masses.append(np.logaddexp.reduce(log_weights + [node.log_mass for node in nodes]))
+        assert error < 0.3
+    assert starts[:2] == [astray, None]
+    assert guide.proposal is not astray
+    assert masses[0] == pytest.approx(masses[1], abs=0.3)
 
 
 def test_a_narrow_and_skewed_density_is_found():

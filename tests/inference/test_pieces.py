@@ -203,6 +203,15 @@ def test_two_peaks_of_points_stay_apart():
     assert [marginal.quantile(p) for p in (0.05, 0.45, 0.55, 0.95)] == pytest.approx(truth, abs=0.1)
 
 
+def test_points_over_powers_of_ten_keep_their_quantiles():
+    """Smoothed as they are, by a kernel for all powers of ten, the median of a fifth was 0.58."""
+    probabilities = (np.arange(400) + 0.5) / 400
+    marginal = marginal_of_points(0.01 * 1e5**probabilities, np.ones(400), (0.01, 1000.0))
+    for probability in (0.05, 0.25, 0.5, 0.75, 0.95):
+        assert marginal.quantile(probability) == pytest.approx(0.01 * 1e5**probability, rel=0.05)
+    assert marginal.mean == pytest.approx(999.99 / np.log(1e5), rel=0.01)
+
+
 def test_points_of_which_one_holds_most_have_a_marginal():
     marginal = marginal_of_points(np.array([0.0, 1.0, 2.0]), np.array([1.0, 8.0, 1.0]), (-np.inf, np.inf))
     assert marginal.quantile(0.5) == pytest.approx(1.0, abs=0.01)

@@ -230,6 +230,8 @@ def _other_modes(
         return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' belongs to the stress of the measured test"
     if "unmodelled-curve" in codes:
         return Verdict.NO, "the material alone does not follow the measured curve"
+    if "inseparable-parameters" in codes:
+        return Verdict.NO, "the measured tests do not tell all parameters, as the warning says"
     if missed:
         return Verdict.NO, f"not even the measured tests are described: {missed}"
     unmeasured = {name: stable_range for name, stable_range in ranges.items() if name not in measured}

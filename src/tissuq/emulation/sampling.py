@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import get_args
@@ -15,7 +15,8 @@ from tissuq.emulation.problem import Method
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal, systematic
+from tissuq.inference.proposal_mixture import weighted_points
+from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, adapted, effective, log_normal, systematic
 from tissuq.parameters.priors import Prior
 
 __all__ = ["SampledPosterior", "sample_posterior"]
@@ -24,8 +25,6 @@ FloatArray = NDArray[np.float64]
 
 SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 16, 32
 """Points of a search round; points of a sampling round, the number of these, and where it does not suffice, at most."""
-COMPONENTS, FITTED_POINTS, FIT_STEPS = 4, 1024, 12
-"""Gaussians of a proposal, points to which they are fitted, and the steps of the fit."""
 MIN_EFFECTIVE_POINTS = 800
 """Smallest effective number of points of a converged posterior."""
 MAX_POINT_WEIGHT = 0.02
@@ -142,42 +141,19 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
     Where the emulator is uncertain every outcome is possible, and a search may end there. So there are two searches,
     one of them as if the emulator were exact.
     """
-    from scipy.stats import qmc
-
     exact = Likelihood(likelihood.problem, likelihood.emulator, has_error=False)
     size = len(likelihood.problem.symbols)
     searched = [
-        adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal for candidate in (exact, likelihood)
+        [(1.0, adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal)]
+        for candidate in (exact, likelihood)
     ]
-    sequence = qmc.Sobol(size, rng=np.random.default_rng([seed, 43]))
-    proposals: list[tuple[float, Proposal]] = []
-    scores, targets, logs, mixture = np.zeros((0, size)), np.zeros(0), np.zeros(0), np.zeros(0)
-    for number in range(MAX_ROUNDS):
-        if number >= ROUNDS and _suffice(logs):
-            break
-        uniforms = np.clip(sequence.random(ROUND_POINTS), 1e-12, 1 - 1e-12)
-        of_round = [(1.0, searched[number])] if number < len(searched) else _components(scores, logs)
-        ends = np.round(np.cumsum([share for share, _ in of_round]) * ROUND_POINTS).astype(int)
-        blocks = np.split(uniforms, ends[:-1])
-        new = np.concatenate([proposal.points(block) for (_, proposal), block in zip(of_round, blocks, strict=True)])
-        more = [
-            (len(block) / ROUND_POINTS, proposal)
-            for (_, proposal), block in zip(of_round, blocks, strict=True)
-            if len(block)
-        ]
-        proposals += more
-        mixture = np.concatenate([np.logaddexp(mixture, _log_mixture(more, scores)), _log_mixture(proposals, new)])
-        scores, targets = np.concatenate([scores, new]), np.concatenate([targets, _log_target(likelihood, new)])
-        if not np.isfinite(targets).any():
+    rounds = weighted_points(partial(_log_target, likelihood), searched, ROUND_POINTS, [seed, 43])
+    for number, weighted in enumerate(rounds, 1):
+        if not weighted[1].max() > LOG_OF_NOTHING:
             raise ConvergenceError("the measurements have no probability at any parameters that the priors allow.")
-        logs = targets - mixture + np.log(number + 1)
-    return scores, logs
-
-
-def _log_mixture(proposals: Sequence[tuple[float, Proposal]], scores: FloatArray) -> FloatArray:
-    """Return the logarithm (N,) of the sum of proposals, times their shares, at scores (N, D)."""
-    heights = [np.log(share) + proposal.log_density(scores) for share, proposal in proposals]
-    return np.asarray(np.logaddexp.reduce(heights, axis=0))
+        if number == MAX_ROUNDS or (number >= ROUNDS and _suffice(weighted[1])):
+            break
+    return weighted
 
 
 def _suffice(logs: FloatArray) -> bool:
@@ -190,47 +166,6 @@ def _log_target(likelihood: Likelihood, scores: FloatArray) -> FloatArray:
     """Return the log of the posterior (N,) at scores (N, D), up to the evidence."""
     height = likelihood.log_density(likelihood.problem.values_of(scores)) + log_normal(scores)
     return np.where(np.isfinite(height), height, -np.inf)
-
-
-def _components(scores: FloatArray, logs: FloatArray) -> list[tuple[float, Proposal]]:
-    """Return proposals with their shares: a mixture of Gaussians fitted to points (N, D) with log weights (N,).
-
-    The width of a discrepancy's amplitude and that of the parameters beside it grow together, which a single Gaussian
-    does not follow. The fit starts at slices of equal weight along one score after the other.
-    """
-    weights = np.exp(logs - logs.max())
-    points = scores[systematic(weights[None], FITTED_POINTS)[0]]
-    points = points + 1e-6 * points.std(axis=0) * np.random.default_rng(0).standard_normal(points.shape)
-    fits = []
-    for axis in range(points.shape[1]):
-        slices = np.argsort(np.argsort(points[:, axis])) * COMPONENTS // FITTED_POINTS
-        shares = np.eye(COMPONENTS)[:, slices]
-        for _ in range(FIT_STEPS):
-            gaussians = [_moved(points, share) for share in shares]
-            heights = np.array([
-                np.log(share.mean()) + _log_gaussian(gaussian, points)
-                for share, gaussian in zip(shares, gaussians, strict=True)
-            ])  # fmt: skip
-            total = np.logaddexp.reduce(heights, axis=0)
-            shares = np.maximum(np.exp(heights - total), 1e-3)
-            shares /= shares.sum(axis=0)
-        fits.append((float(total.mean()), [(float(share.mean()), _moved(points, share)) for share in shares]))
-    return max(fits, key=lambda fit: fit[0])[1]
-
-
-def _log_gaussian(proposal: Proposal, points: FloatArray) -> FloatArray:
-    """Return the log density (N,) of the Gaussian with mean and root of a proposal, at points (N, D)."""
-    standard = np.asarray(np.linalg.solve(proposal.root, (points - proposal.mean).T).T, dtype=np.float64)
-    return np.asarray(log_normal(standard) - np.log(np.abs(np.diag(proposal.root))).sum())
-
-
-def _moved(scores: FloatArray, weights: FloatArray) -> Proposal:
-    """Return a proposal with the mean and the covariance of points (N, D) with weights (N,)."""
-    weights = weights / weights.sum()
-    mean = weights @ scores
-    centred = scores - mean
-    covariance = (weights[:, None] * centred).T @ centred + 1e-12 * np.eye(len(mean))
-    return Proposal(mean, np.asarray(np.linalg.cholesky(covariance)))
 
 
 def _by_nuts(likelihood: Likelihood, seed: int, search: SampledPosterior | None) -> SampledPosterior:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -127,9 +128,14 @@ def marginal_of_points(
 
     Silverman's bandwidth, unless another is given, for the shortest interval that holds half of them, as between two
     peaks the standard deviation is that of neither; points near a bound are mirrored there, and elsewhere drawn towards
-    the mean by what the kernel adds to the variance.
+    the mean by what the kernel adds to the variance. Above a bound that is positive, as those of what may differ by
+    powers of ten are, the logarithms are smoothed.
     """
     weights = weights / weights.sum()
+    if bounds[0] > 0 and bandwidth is None:
+        logs = marginal_of_points(np.log(points), weights, (log(bounds[0]), log(bounds[1])))
+        values = np.exp(logs.points)
+        return Marginal.of(*moments_of_values(weights, points), values, logs.density / values, logs.cumulative)
     mean, sd = moments_of_values(weights, points)
     spread = min(sd, _shortest_half(points, weights) / 1.349 or sd)
     bandwidth = bandwidth or 0.9 * spread * float(weights @ weights) ** 0.2

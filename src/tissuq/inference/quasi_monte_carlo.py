@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "LOG_OF_NOTHING",
     "MAX_SEARCHES",
     "SHIFTS",
     "Adaptation",
@@ -23,6 +24,7 @@ __all__ = [
     "quasi_random",
     "resampled_at_random",
     "systematic",
+    "tempered",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -211,7 +213,7 @@ def _search(
             [proposal_of_round.log_density(points) for proposal_of_round in proposals], axis=0
         ) - log(len(proposals))
         log_weights = np.nan_to_num(values - mixture, nan=LOG_OF_NOTHING, neginf=LOG_OF_NOTHING)
-        weights, power = _tempered(log_weights, least_effective)
+        weights, power = tempered(log_weights, least_effective)
         mean = weights @ points
         away = points - mean
         covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
@@ -227,7 +229,7 @@ def _search(
     return adaptation._replace(is_settled=False)
 
 
-def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:
+def tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:
     """Return normalised weights to the largest power at most one that leaves enough effective, and that power."""
     low, high = 0.0, 1.0
     if effective(log_weights) >= min_effective:

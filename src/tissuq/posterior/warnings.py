@@ -13,6 +13,7 @@ from tissuq.assessment.extent import has_energy
 from tissuq.assessment.measurements import labels_of_tests
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
+from tissuq.assessment.separability import inseparable_parameters
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
@@ -117,6 +118,15 @@ def warnings_about(
             "interpret either one alone, or give the noise (repeated measurements at one stretch determine it).",
             "inseparable-noise",
             Severity.NOTE,
+        )
+    if together := inseparable_parameters(solution):
+        yield ResultWarning(
+            f"the tests do not tell {' and '.join(together)}{' apart' if len(together) > 1 else ''}: other values give "
+            "the same stresses, so that their intervals are those of their priors, and only what was measured may be "
+            "predicted. Measure in another mode or direction, or give what is known of them by priors (of fibres the "
+            "angle, as in exponential-fibres@30).",
+            "inseparable-parameters",
+            symbols=[*together],
         )
     error = solution.log_evidence_error
     if error is not None and not error <= MAX_LOG_EVIDENCE_ERROR and solution.diagnostics is None:

@@ -1,23 +1,27 @@
-"""Weighted points of an adapted proposal over any number of nonlinear parameters, the linear ones in closed form."""
+"""Weighted points of adapted proposals over any number of nonlinear parameters, the linear ones in closed form."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy
+from tissuq.inference.enumerators.survey import climb
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal
+from tissuq.inference.proposal_mixture import Mixture, fitted, weighted_points
+from tissuq.inference.quasi_monte_carlo import Proposal, effective, even_points, log_normal
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.threads import one_thread
 from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
-from tissuq.model.scales import at_scores
+from tissuq.model.scales import MAX_SCORE, at_scores
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
@@ -26,11 +30,17 @@ __all__ = ["IRRELEVANT_LOG_DROP", "AdaptedPoints"]
 FloatArray = NDArray[np.float64]
 
 POINTS_PER_PARAMETER = 256
-"""Points of a round for each parameter, and once more."""
+"""Points of a round for each parameter, about: their number is a power of two."""
 EFFECTIVE_MULTIPLE = 20.0
 """Effective points over those of values that each cost a sum over energies, for which `Accuracy` is made."""
 IRRELEVANT_LOG_DROP = 14.0
 """Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
+MIN_ROUNDS, MAX_ROUNDS, MAX_CHANGE = 4, 40, 0.1
+"""Rounds at least, unless a similar model is known, and at most, and change of the log of the mass in the last."""
+SURVEY_POINTS, CLIMBS, LEAST_DISTANCE = 1024, 8, 0.7
+"""Points of the prior among which climbs to peaks begin, how many do, and how far apart."""
+RELEVANT_LOG_DROP = 20.0
+"""Logarithm of the mass of a peak below the largest at which it does not count."""
 NEGLIGIBLE_WEIGHT = 1e-9
 """Share of the posterior that a point must hold."""
 MAX_COMPONENTS = 3000
@@ -44,12 +54,12 @@ class AdaptedPoints:
     Parameters
     ----------
     accuracy : Accuracy
-    proposal : Proposal, optional
-        Where the posterior of a similar model lies, with which the search begins; that of the last model afterwards.
+    start : Mixture, optional
+        Where the posterior of a similar model lies, at which the points begin; that of the last model afterwards.
     """
 
     accuracy: Accuracy = FINE
-    proposal: Proposal | None = None
+    start: Mixture | None = None
 
     @staticmethod
     def why_not(model: StatisticalModel) -> str:
@@ -74,22 +84,24 @@ class AdaptedPoints:
 
     def _solution(self, model: StatisticalModel, seed: int) -> Solution:
         density, dimension = _Density(model), len(model.nonlinear)
-        start, min_effective = self.proposal, EFFECTIVE_MULTIPLE * self.accuracy.min_effective
-        if start is None:
-            start = adapted(density, dimension).proposal
-        count = POINTS_PER_PARAMETER * (dimension + 1)
-        adaptation = adapted(density, dimension, count, start=start, min_effective=min_effective)
-        log_weights, number = adaptation.log_weights, effective(adaptation.log_weights)
-        if not adaptation.is_settled or number < min_effective:
+        min_effective, earlier = EFFECTIVE_MULTIPLE * self.accuracy.min_effective, np.inf
+        starts = [self.start or _around_peaks(density, dimension)]
+        rounds = weighted_points(density, starts, 1 << (POINTS_PER_PARAMETER * dimension).bit_length(), seed=0)
+        for done, (points, log_weights) in enumerate(islice(rounds, MAX_ROUNDS), 1):
+            number, log_mass = effective(log_weights), float(np.logaddexp.reduce(log_weights)) - log(len(points))
+            is_settled, earlier = number >= min_effective and abs(log_mass - earlier) < MAX_CHANGE, log_mass
+            if is_settled and (self.start or done >= MIN_ROUNDS):
+                break
+        else:
             raise ConvergenceError(
                 f"the posterior of {', '.join(model.nonlinear)} was not found well enough: {number:.0f} of "
                 f"{len(log_weights)} points are effective. Give narrower priors, or use the method 'nuts'."
             )
-        self.proposal = adaptation.proposal
+        self.start = fitted(points, log_weights)
         weights = np.exp(log_weights - log_weights.max())
         weights /= weights.sum()
         matters = weights > NEGLIGIBLE_WEIGHT
-        weights, settings = weights[matters] / weights[matters].sum(), density.settings(adaptation.points[matters])
+        weights, settings = weights[matters] / weights[matters].sum(), density.settings(points[matters])
         box, gaussians = density.conditional.boxes, density.conditional(settings[None])
         mixture = GaussianMixture(weights, settings, gaussians.mean[0], gaussians.root[0])
         mass_outside = box.beyond(mixture.mean, mixture.root)
@@ -115,7 +127,31 @@ class AdaptedPoints:
             return solution
         _, error_of_mass = checked_masses(model.linear, mixture, mass_outside, box)
         error = float(np.sqrt(1 / number - 1 / len(log_weights))) + error_of_mass
-        return replace(solution, log_evidence=adaptation.log_mass, log_evidence_error=error)
+        return replace(solution, log_evidence=log_mass, log_evidence_error=error)
+
+
+def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> Mixture:
+    """Return a mixture with a part around each peak that is reached from good points of the prior far apart."""
+    from scipy.special import ndtri
+
+    points = ndtri(even_points(dimension, SURVEY_POINTS))
+    values = log_density(points)
+    feet: list[FloatArray] = []
+    for index in np.argsort(-values):
+        if all(np.linalg.norm(points[index] - foot) > LEAST_DISTANCE for foot in feet):
+            feet.append(points[index])
+        if len(feet) == CLIMBS:
+            break
+
+    def evaluate(stencils: FloatArray) -> FloatArray:
+        return log_density(stencils.reshape(-1, dimension)).reshape(stencils.shape[:-1])
+
+    peaks, heights, curvatures = climb(evaluate, np.array(feet)[None], np.array(-MAX_SCORE), np.array(MAX_SCORE))
+    covariances = np.linalg.inv(curvatures[0])
+    log_masses = heights[0] + 0.5 * np.linalg.slogdet(covariances)[1]
+    matter = np.flatnonzero(log_masses >= log_masses.max() - RELEVANT_LOG_DROP)
+    roots = np.linalg.cholesky(covariances)
+    return [(1 / len(matter), Proposal(peaks[0, peak], roots[peak])) for peak in matter]
 
 
 class _Density:

@@ -104,8 +104,11 @@ class _Search:
         return guide.peaks
 
     def by_proposal(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
-        """Return nodes at points that a proposal gives, adapted until enough of them are effective."""
-        d = len(self._outer.symbols)
+        """Return nodes at points that a proposal gives, adapted until enough of them are effective.
+
+        Where those that begin with the posterior of a similar model do not lead there, they begin anew.
+        """
+        d, members = len(self._outer.symbols), self._members
         start = guide.proposal
         if start is None:
             start = adapted(self._scouted, d).proposal
@@ -121,6 +124,10 @@ class _Search:
         count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
         min_effective = guide.accuracy.min_effective
         adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
+        is_found = adaptation.is_settled and effective(adaptation.log_weights) >= min_effective
+        if guide.proposal is not None and not is_found:
+            guide.proposal, self._members = None, members
+            return self.by_proposal(guide)
         guide.proposal, nodes = adaptation.proposal, nodes[-len(adaptation.points) :]
         self._check_place(guide.proposal.mean)
         error = relative_error(self._outer, adaptation.log_weights, min_effective)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.parameters.priors import Prior
 
-__all__ = ["Survey", "Warp", "coordinates_of", "log_prior_density", "parameters_of", "survey", "warp_along"]
+__all__ = ["Survey", "Warp", "climb", "coordinates_of", "log_prior_density", "parameters_of", "survey", "warp_along"]
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
@@ -117,6 +117,32 @@ def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: Lo
     return Survey(structure, is_log, bounds[:, :, 0], bounds[:, :, 1], mean, covariance)
 
 
+def climb(
+    evaluate: LogDensity, point: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Climb to the modes, all at once, by damped Newton steps on finite differences."""
+    value, gradient, curvature = _derivatives(evaluate, point)
+    damping = np.full(value.shape, 1e-2)
+    done = ~np.isfinite(value)
+    for _ in range(MAX_NEWTON_STEPS):
+        steep = curvature + damping[..., None, None] * np.eye(point.shape[-1])
+        step = np.linalg.solve(steep, gradient[..., None])[..., 0]
+        trial = np.clip(point + np.clip(step, -2.0, 2.0), low, high)
+        derivatives = _derivatives(evaluate, trial)
+        better = (derivatives[0] > value) & ~done
+        moved = np.abs(trial - point).max(axis=-1)
+        point = np.where(better[..., None], trial, point)
+        value, gradient, curvature = (
+            np.where(better.reshape(better.shape + (1,) * (new.ndim - 2)), new, old)
+            for new, old in zip(derivatives, (value, gradient, curvature), strict=True)
+        )
+        damping = np.where(better, np.maximum(damping / 8, 1e-8), damping * 8)
+        done |= (moved < COORDINATE_TOLERANCE) | (damping > 1e8)
+        if done.all():
+            break
+    return point, value, curvature
+
+
 def _probes(priors: Sequence[Prior], is_log: NDArray[np.bool_]) -> list[FloatArray]:
     """Return coordinates to try along each parameter."""
     powers, even = 0.5 ** np.arange(1, PROBES + 1), np.linspace(0.05, 0.95, PROBES)
@@ -157,35 +183,9 @@ def _modes(
     inside = np.where(np.isfinite(bounds), bounds, np.sign(bounds) * 1e6)
     margin = 1e-4 * np.minimum(inside[:, :, 1] - inside[:, :, 0], 1.0)
     low, high = (inside[:, :, 0] + margin)[:, None], (inside[:, :, 1] - margin)[:, None]
-    point, value, curvature = _climb(evaluate, np.clip(start, low, high), low, high)
+    point, value, curvature = climb(evaluate, np.clip(start, low, high), low, high)
     covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
     return point, covariance, value + 0.5 * np.linalg.slogdet(covariance)[1]
-
-
-def _climb(
-    evaluate: LogDensity, point: FloatArray, low: FloatArray, high: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Climb to the modes, all at once, by damped Newton steps on finite differences."""
-    value, gradient, curvature = _derivatives(evaluate, point)
-    damping = np.full(value.shape, 1e-2)
-    done = ~np.isfinite(value)
-    for _ in range(MAX_NEWTON_STEPS):
-        steep = curvature + damping[..., None, None] * np.eye(point.shape[-1])
-        step = np.linalg.solve(steep, gradient[..., None])[..., 0]
-        trial = np.clip(point + np.clip(step, -2.0, 2.0), low, high)
-        derivatives = _derivatives(evaluate, trial)
-        better = (derivatives[0] > value) & ~done
-        moved = np.abs(trial - point).max(axis=-1)
-        point = np.where(better[..., None], trial, point)
-        value, gradient, curvature = (
-            np.where(better.reshape(better.shape + (1,) * (new.ndim - 2)), new, old)
-            for new, old in zip(derivatives, (value, gradient, curvature), strict=True)
-        )
-        damping = np.where(better, np.maximum(damping / 8, 1e-8), damping * 8)
-        done |= (moved < COORDINATE_TOLERANCE) | (damping > 1e8)
-        if done.all():
-            break
-    return point, value, curvature
 
 
 def _derivatives(evaluate: LogDensity, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
