@@ -247,7 +247,7 @@ def test_of_a_cycle_whose_residuals_are_correlated_one_branch_is_advised():
         advice[name] = next(warning.shell for warning in warnings if warning.code == "correlated-residuals")
     assert "--branch loading" in advice["cycle"]
     assert "--branch" not in advice["branch"]
-    assert "--noise autoregressive" in advice["branch"]
+    assert "--noise autoregressive, or with fewer points (--every " in advice["branch"]
 
 
 @pytest.mark.slow
@@ -311,7 +311,7 @@ def test_what_is_said_to_be_too_narrow_is_used_with_care_at_best():
     correlated = ResultWarning("residuals are autocorrelated.", "correlated-residuals")
     for use in posterior.answer_with([correlated]).uses[:2]:
         assert use.verdict is Verdict.CARE
-        assert "the errors of consecutive measurements hang together" in use.reason
+        assert "the errors of consecutive measurements are correlated" in use.reason
 
 
 def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
@@ -357,7 +357,7 @@ def test_a_sheet_with_a_direction_needs_fibres_and_no_stable_draws_of_a_law_with
     law = SimpleNamespace(material=material_named("neo-hookean"), energy_symbols=("c1",), experiment=tests)
     solution = SimpleNamespace(model=law, is_of_data=True, is_directed=is_directed)
     uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
-    unstable = ResultWarning("unstable more often than stable.", "unstable")
+    unstable = ResultWarning("stable in only 20 % of the draws.", "unstable")
     assert next_step(solution, uses, [unstable]) == STEPS[name]
 
 

@@ -42,7 +42,7 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
-CORRELATED, CORRELATED_ERRORS = "correlated-residuals", "the errors of consecutive measurements hang together"
+CORRELATED, CORRELATED_ERRORS = "correlated-residuals", "the errors of consecutive measurements are correlated"
 """Code of the warning that intervals are too narrow, and why."""
 UNKNOWN = 3.0
 """Half width over the mean from which not even a sign or a power of ten is known."""
