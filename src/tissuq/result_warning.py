@@ -79,7 +79,7 @@ class ResultWarning(str):
     severity : Severity
     symbols : sequence of str
         The parameters that it is about, where it names some.
-    **options : str or int
+    **options : str, int or True
         Values of the options in the text, by their names in Python.
 
     Attributes
@@ -115,8 +115,12 @@ class ResultWarning(str):
         """Return the sentence with its options in both forms."""
         if code not in WARNING_CODES:
             raise ValueError(f"'{code}' is no code of a warning; add it to WARNING_CODES and docs/warnings.md.")
-        python = {name: f"{name}={dumps(value)}" for name, value in options.items()}
-        shell = {name: f"--{name.replace('_', '-')} {value}" for name, value in options.items()}
+        python = {
+            name: f"{name}={dumps(value) if isinstance(value, str) else value}" for name, value in options.items()
+        }
+        shell = {
+            name: f"--{name.replace('_', '-')}{'' if value is True else f' {value}'}" for name, value in options.items()
+        }
         warning = super().__new__(cls, text.format(**python) if options else text)
         warning.code, warning.severity, warning.symbols = code, severity, tuple(symbols)
         warning.shell = text.format(**shell) if options else text

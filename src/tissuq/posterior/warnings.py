@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
-from tissuq.assessment.measurements import labels_of_tests
+from tissuq.assessment.measurements import falls, labels_of_tests
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
@@ -170,9 +170,16 @@ def _instability(solution: Solution, stable_range: StableRange) -> ResultWarning
     at_rest = " (already at rest)" if stable_range.loss.median == 1 else ""
     if at_rest and modulus(solution).mean < 0:
         at_rest = " (already at rest: the initial shear modulus is negative)"
+    finding = f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: "
+    if falls(solution.model.experiment):
+        return ResultWarning(
+            finding + "leave out where the measured stress falls, which no stable material does ({until_peak}).",
+            "unstable",
+            until_peak=True,
+        )
     return ResultWarning(
-        f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: measure in more "
-        "loading modes, choose another material, or restrict the fit to stable materials ({stable_in}).",
+        finding + "measure in more loading modes, choose another material, or restrict the fit to stable materials "
+        "({stable_in}).",
         "unstable",
         stable_in="all",
     )
