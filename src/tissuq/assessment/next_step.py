@@ -58,7 +58,7 @@ STEPS: Mapping[str, Step] = {
     "specimens": Step(*["measure further specimens: how much they differ is assumed so far, and sets the width."] * 2),
     "unnamed specimens": Step(
         "if the tests are of one specimen, say so: fit again with --specimen NAME once for each; if not, measure more.",
-        'if the tests are of one specimen, say so: tq.Experiment(..., specimen="NAME"); if not, measure more.',
+        'if the tests are of one specimen, say so: fit [test.labelled(specimen="NAME"), ...]; if not, measure more.',
     ),
     "law": Step(
         "see whether another law describes the measurements by itself: fit again with --material all.",
