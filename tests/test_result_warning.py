@@ -105,3 +105,9 @@ def test_every_code_is_used_by_the_package():
     source = "".join(path.read_text(encoding="utf-8") for path in (PAGE.parents[1] / "src").rglob("*.py"))
     for code in WARNING_CODES:
         assert source.count(f'"{code}"') >= 2, code
+
+
+def test_numbers_and_flags_are_options_as_they_are_typed():
+    warning = ResultWarning("give {every} or {until_peak}.", "correlated-residuals", every=3, until_peak=True)
+    assert str(warning) == "give every=3 or until_peak=True."
+    assert warning.shell == "give --every 3 or --until-peak."

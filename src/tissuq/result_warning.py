@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
+from json import dumps
 from types import MappingProxyType
 
 __all__ = [
@@ -40,7 +41,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "unmodelled-curve": "The fitted curve does not follow the measured one.",
         "measurements": "Something in the file or in the course of the test is implausible.",
         "few-measurements": "There are too few measurements to show how the stress deviates from the material.",
-        "unstable": "Material and discrepancy are more often unstable than stable over the measured range.",
+        "unstable": "Material and discrepancy are stable in fewer than half of the draws over the measured range.",
         "best-fit-target": "The discrepancy aims at the best fit of the material, not at its initial modulus.",
         "no-discrepancy": "No error of the forward model is allowed for.",
         "free-discrepancy": "The discrepancy beside a forward model is learnt from one experiment.",
@@ -79,7 +80,7 @@ class ResultWarning(str):
     severity : Severity
     symbols : sequence of str
         The parameters that it is about, where it names some.
-    **options : str
+    **options : str, int or True
         Values of the options in the text, by their names in Python.
 
     Attributes
@@ -110,13 +111,17 @@ class ResultWarning(str):
         code: str = "measurements",
         severity: Severity = Severity.CAUTION,
         symbols: Iterable[str] = (),
-        **options: str,
+        **options: str | int,
     ) -> ResultWarning:
         """Return the sentence with its options in both forms."""
         if code not in WARNING_CODES:
             raise ValueError(f"'{code}' is no code of a warning; add it to WARNING_CODES and docs/warnings.md.")
-        python = {name: f'{name}="{value}"' for name, value in options.items()}
-        shell = {name: f"--{name.replace('_', '-')} {value}" for name, value in options.items()}
+        python = {
+            name: f"{name}={dumps(value) if isinstance(value, str) else value}" for name, value in options.items()
+        }
+        shell = {
+            name: f"--{name.replace('_', '-')}{'' if value is True else f' {value}'}" for name, value in options.items()
+        }
         warning = super().__new__(cls, text.format(**python) if options else text)
         warning.code, warning.severity, warning.symbols = code, severity, tuple(symbols)
         warning.shell = text.format(**shell) if options else text

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.app.account import account
+from tissuq.app.account import account, modes_of_specimens
 
 
 def taken(file, question, label, reading=None, mode=None):
@@ -44,6 +45,14 @@ def test_an_unstated_unit_and_mode_are_questions_and_their_answers_settle_them(h
     assert [question["text"] for question in mended["questions"]] == [mode["text"]]
     planar = taken("kidney.csv", mode, "planar", {"stress_unit": "kPa"})
     assert (planar["tests"][0]["mode"], planar["questions"]) == ("planar", [])
+
+
+def test_a_strip_along_axis_2_of_the_tissue_is_a_mode_to_choose(here, write_stretches):
+    write_stretches(here)
+    (question,) = account(["kidney.csv"], {}, [None])["questions"]
+    for mode in ("uniaxial@2", "planar@2"):
+        assert taken("kidney.csv", question, mode)["tests"][0]["mode"] == mode
+    assert {"uniaxial@2", "planar@2"} < {mode.name for mode in modes_of_specimens()}
 
 
 def test_a_length_that_is_missing_is_asked_for_and_makes_the_stretches_right(here, write_machine):
@@ -86,3 +95,15 @@ def test_a_file_that_holds_no_measurements_is_refused_with_the_message_of_the_co
     assert found["error"]["text"] == str(refusal.value)
     assert (found["tests"], found["error"]["file"]) == ([], "bad.csv")
     json.dumps(found, allow_nan=False)
+
+
+def test_every_law_that_a_next_step_names_can_be_chosen():
+    from tissuq.app import tasks
+    from tissuq.assessment.next_step import STEPS
+
+    said = []
+    tasks.choices({}, lambda kind, record: said.append(record))
+    laws = {law["name"] for law in said[0]["materials"]} | {"all"}
+    named = {word for step in STEPS.values() for word in re.findall(r"--material ([\w-]+)", step.shell)}
+    assert named <= laws
+    assert len(named) == 2

@@ -124,6 +124,17 @@ def test_a_fit_of_several_files_is_repeated(here, write_stretches, monkeypatch):
 
 
 @pytest.mark.slow
+def test_strips_along_both_axes_of_a_tissue_are_repeated(here, write_stretches, monkeypatch):
+    write_stretches(here, "circumferential.csv")
+    write_stretches(here, "axial.csv", c10=3.0)
+    request = {"files": ["circumferential.csv", "axial.csv"], "modes": ["uniaxial", "uniaxial@2"]}
+    said = done("fit", request | {"discrepancies": ["none"]})
+    assert said["answer"]["modes"] == ["uniaxial", "uniaxial@2"]
+    assert "--mode uniaxial --mode uniaxial@2" in said["answer"]["repeat"]["shell"]
+    check_repeats(said, monkeypatch)
+
+
+@pytest.mark.slow
 def test_laws_predictions_and_cards_are_repeated(here, write_stretches, monkeypatch):
     write_stretches(here)
     measured = {"files": ["kidney.csv"], "modes": ["uniaxial"], "discrepancies": ["none"]}

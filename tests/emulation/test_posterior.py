@@ -378,8 +378,9 @@ def test_a_saved_calibration_is_read_by_xarray(tmp_path):
     [
         ({"control": DEPTH[:4]}, "4 controls and 15 measured"),
         ({"measured": np.zeros_like(DEPTH)}, "measured values are zero"),
-        ({"measured": [1.0, np.nan] * 8, "control": np.arange(16)}, "measured is nan"),
+        ({"measured": [1.0, np.nan] * 8, "control": np.arange(16)}, "measured is nan at position 1"),
         ({"priors": {}}, "give a prior for every parameter"),
+        ({"priors": [tq.Uniform(0, 5)]}, "priors must be by parameter"),
         ({"priors": {"C10": tq.Flat()}}, "flat and improper"),
         ({"priors": {"C10": 3.0}}, "must be a prior"),
         ({"priors": {"C10": tq.Uniform(0.2, 5.0), "noise_sd": tq.Uniform(0, 1)}}, r"prior of noise_sd .* \(0.1\)"),

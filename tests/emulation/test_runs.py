@@ -81,7 +81,7 @@ def test_a_function_of_a_module_is_found():
     assert FileForward("builtins:len").run({"C10": 1.0}, DEPTH) == 1
 
 
-def test_a_run_that_fails_is_a_result_and_a_wrong_shape_is_an_error():
+def test_a_run_that_fails_or_stops_early_is_a_result_and_a_wrong_shape_is_an_error():
     def broken(parameters):
         raise ZeroDivisionError("division by zero\nat length")
 
@@ -89,6 +89,8 @@ def test_a_run_that_fails_is_a_result_and_a_wrong_shape_is_an_error():
     assert carry_out(task)["error"] == "ZeroDivisionError: division by zero"
     some = ForwardRun(CallableForward(lambda p: np.where(DEPTH > 0.2, np.nan, 1)), (("C10", 1.0),), tuple(DEPTH), 1)
     assert "of 15 outputs are not finite, the first at the control " in carry_out(some)["error"]
+    short = ForwardRun(CallableForward(lambda p: DEPTH[:-2]), (("C10", 1.0),), tuple(DEPTH), 1)
+    assert carry_out(short)["error"].startswith("outputs of shape (13,); there are 15 measurements")
     with pytest.raises(InputError, match="15 measurements"):
         carry_out(ForwardRun(CallableForward(lambda p: 1.0), (("C10", 1.0),), tuple(DEPTH), 1))
 

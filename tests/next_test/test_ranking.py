@@ -33,6 +33,8 @@ def test_tests_are_ranked_for_every_target_with_the_data_again(posterior):
     assert far["beyond"] == pytest.approx(2 / 3)
     assert far["note"] == "67 % beyond the data"
     assert (table["stable"] == 1).all()
+    single = posterior.design("planar 1:1.2 10")
+    assert "planar 1 to 1.2, 10 points" in set(single["candidate"])
 
 
 def test_what_is_as_good_as_the_best_is_marked():

@@ -183,3 +183,16 @@ def test_the_largest_seed_is_sampled_and_saved(tmp_path):
     posterior = tq.fit(MIXED[0], discrepancy="none", noise_sd=0.1, seed=2**62)
     posterior.save(tmp_path / "posterior.nc")
     assert (tmp_path / "posterior.nc").stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"material": "all"}, "tissuq.fit_laws"),
+        ({"priors": [tq.Uniform(0, 5)]}, "priors must be by parameter"),
+        ({"mode": ["uniaxial", "planar"]}, "give each its own in .tissuq.read"),
+    ],
+)
+def test_what_is_of_several_fits_or_tests_says_where_it_belongs(options, words):
+    with pytest.raises(tq.InputError, match=words):
+        tq.fit({"stretch": [1.0, 1.1, 1.2], "stress [kPa]": [0.0, 1.0, 2.0]}, **options)

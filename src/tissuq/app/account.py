@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.errors import TissuqError
-from tissuq.experiments.modes import loading_modes
+from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.experiments.reading.inspection import Inspection, overview
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["account"]
+__all__ = ["account", "modes_of_specimens"]
 
 MAX_POINTS = 1500
 """Points of a curve that are drawn."""
@@ -93,9 +93,16 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
                     record["questions"] += [doubt | {"file": str(path)}] if doubt["answers"] else []
         silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
         if silent:
-            answers = [_plain_mode(name, kind.description) for name, kind in loading_modes().items()]
+            answers = [_plain_mode(mode.name, mode.description) for mode in modes_of_specimens()]
             record["questions"].append({"text": MODE, "plain": MODE, "answers": answers, "shown": 1, "file": silent[0]})
     return record
+
+
+def modes_of_specimens() -> list[LoadingMode]:
+    """Return every loading mode, and at the end those of specimens that were cut along axis 2 of the tissue."""
+    kinds = loading_modes()
+    along_axis_2 = [f"{name}@2" for name, kind in kinds.items() if kind.has_axis]
+    return [loading_mode(name) for name in (*kinds, *along_axis_2)]
 
 
 def _modes_of(

@@ -23,9 +23,10 @@ RUNS, CARDS = Path("runs"), Path("cards")
 
 def choices(_: Mapping[str, Any], say: Say) -> None:
     """Say what there is to choose from."""
-    from tissuq.experiments.modes import loading_modes
+    from tissuq.app.account import modes_of_specimens
     from tissuq.export import card_formats
-    from tissuq.mechanics.material import materials
+    from tissuq.mechanics import material_named
+    from tissuq.mechanics.material import SUMS, materials
     from tissuq.model.discrepancy import discrepancies
     from tissuq.model.tolerances import ESTIMANDS
 
@@ -33,12 +34,12 @@ def choices(_: Mapping[str, Any], say: Say) -> None:
         "done",
         {
             "materials": [
-                {"name": name, "words": kind.formula, "is_isotropic": kind.is_isotropic}
-                for name, kind in materials().items()
+                {"name": name, "words": law.formula, "is_isotropic": law.is_isotropic}
+                for name, law in ((name, material_named(name)) for name in (*materials(), *SUMS))
             ],
             "modes": [
-                {"name": name, "words": kind.description, "controls": [control.name for control in kind.controls]}
-                for name, kind in loading_modes().items()
+                {"name": mode.name, "words": mode.description, "controls": [control.name for control in mode.controls]}
+                for mode in modes_of_specimens()
             ],
             "discrepancies": [{"name": name, "words": kind.formula} for name, kind in discrepancies().items()],
             "estimands": [{"name": name, "words": kind.description} for name, kind in ESTIMANDS.items()],

@@ -13,7 +13,7 @@ from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["factors_of_tests", "labels_of_tests", "measurement_warnings"]
+__all__ = ["factors_of_tests", "falls", "labels_of_tests", "measurement_warnings"]
 
 MIN_MEASUREMENTS = 12
 """Smallest number of measurements that describe how the stress deviates from the material."""
@@ -22,6 +22,20 @@ NEAR_STRAIN_SHARE = 0.15
 
 MIN_CHANGE, MIN_ERRORS = 0.2, 4.0
 """Change of the ratio of two tests' stresses along them, over its middle, that is told, and its standard errors."""
+
+MEASUREMENTS_OF_MEAN, MIN_FALL = 3, 0.05
+"""Consecutive measurements whose mean is compared, and by what share of the largest mean a stress falls to the end."""
+
+
+def falls(experiment: Experiment) -> bool:
+    """Return whether a stress that was measured on the way out falls before the largest stretch, by more than noise."""
+    for curve in experiment.curves:
+        stress = curve.stress[~curve.is_back][np.argsort(curve.abscissa[~curve.is_back], kind="stable")]
+        if len(stress) >= MEASUREMENTS_OF_MEAN:
+            means = np.convolve(stress, np.full(MEASUREMENTS_OF_MEAN, 1 / MEASUREMENTS_OF_MEAN), mode="valid")
+            if means.max() - means[-1] > MIN_FALL * np.abs(means).max():
+                return True
+    return False
 
 
 def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.assessment.measurements import falls
 from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict
 from tissuq.inference.solution import Solution
@@ -57,7 +58,7 @@ STEPS: Mapping[str, Step] = {
     "specimens": Step(*["measure further specimens: how much they differ is assumed so far, and sets the width."] * 2),
     "unnamed specimens": Step(
         "if the tests are of one specimen, say so: fit again with --specimen NAME once for each; if not, measure more.",
-        'if the tests are of one specimen, say so: tq.Experiment(..., specimen="NAME"); if not, measure more.',
+        'if the tests are of one specimen, say so: fit [test.labelled(specimen="NAME"), ...]; if not, measure more.',
     ),
     "law": Step(
         "see whether another law describes the measurements by itself: fit again with --material all.",
@@ -76,6 +77,10 @@ STEPS: Mapping[str, Step] = {
     "stable": Step(
         "restrict the fit to stable materials: fit again with --stable-in all.",
         'restrict the fit to stable materials: fit again with stable_in="all".',
+    ),
+    "peak": Step(
+        "leave out where the stress falls, which no stable material does: fit again with --until-peak.",
+        "leave out where the stress falls, which no stable material does: read again with until_peak=True.",
     ),
     "export": Step(
         "take it into finite elements: tissuq export {run} --format abaqus",
@@ -120,8 +125,11 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
         is_due = verdicts.index(reporting) >= verdicts.index(ONLY_IN_DOUBT.get(warning.code, Verdict.YES))
         if warning.severity is Severity.CAUTION and warning.code in STEPS_OF_WARNINGS and is_due:
             name = STEPS_OF_WARNINGS[warning.code]
-            is_hopeless = name == "stable" and solution.is_directed  # no card of the law has the direction
-            return _with_options(STEPS["fibres" if is_hopeless else name], warning, warnings)
+            if name == "stable" and solution.is_directed:  # no card of the law has the direction
+                name = "fibres"
+            elif name == "stable" and falls(model.experiment):
+                name = "peak"
+            return _with_options(STEPS[name], warning, warnings)
     if not solution.is_of_data:
         return STEPS["export"]
     if solution.is_directed:

@@ -272,7 +272,8 @@ def emulate(
         failed = f" {runs.failure_summary}" if runs.failed.any() else ""
         raise ModelError(
             f"an emulator of {points.shape[1]} parameters with a {trend} mean needs {needed} runs that succeed, and "
-            f"there are {len(points)}.{failed}"
+            f"there are {len(points)}.{failed} Ask for more runs, or give priors without "
+            "the values at which the model fails."
         )
     if np.ptp(outputs, axis=0).max() == 0:
         raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")

@@ -281,7 +281,10 @@ def _function_at(location: str) -> Callable[..., Any]:
 def _function_of_module(location: str) -> Callable[..., Any]:
     module, _, name = location.partition(":")
     if not name or not module.replace(".", "_").isidentifier():
-        raise InputError(f"'{location}' does not name a function: write path.py:function or package.module:function.")
+        raise InputError(
+            f"'{location}' does not name a function: write path.py:function or package.module:function. A program "
+            "is run by such a function, with subprocess.run."
+        )
     try:
         function = getattr(import_module(module), name, None)
     except ImportError as error:

@@ -180,7 +180,8 @@ def check_material(
     if missing := [symbol for symbol in symbols if symbol not in priors]:
         raise InputError(
             f"the material {law.name} has the parameters {', '.join(symbols)}, and the forward model was calibrated "
-            f"without {', '.join(missing)} (its parameters: {', '.join(priors)})."
+            f"without {', '.join(missing)} (its parameters: {', '.join(priors)}). Let the forward model and the priors "
+            "call them as the material does."
         )
     in_mpa = {
         parameter.symbol: priors[parameter.symbol].scaled(factor if parameter.unit else 1.0)

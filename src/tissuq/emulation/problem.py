@@ -195,6 +195,8 @@ def pose(
     if set(noises) != set(columns):
         raise InputError(f"noise_sd is given for {', '.join(noises)}; what was measured is {', '.join(columns)}.")
     form = _discrepancy(discrepancy, zero_load)
+    if not isinstance(priors, Mapping):
+        raise InputError(f"priors must be by parameter, such as {{'C10': tissuq.Uniform(0, 5)}}, not {priors!r}.")
     error_priors: dict[str, Prior] = {}
     for name, (controls, values) in columns.items():
         sd = noises[name]
@@ -283,7 +285,8 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     if column.ndim != 1 or not column.size:
         raise InputError(f"{name} must be a one-dimensional array with values, not of shape {column.shape}.")
     if not np.isfinite(column).all():
-        raise InputError(f"{name} is {column[~np.isfinite(column)][0]} somewhere; every value must be a finite number.")
+        place = int(np.flatnonzero(~np.isfinite(column))[0])
+        raise InputError(f"{name} is {column[place]} at position {place}; every value must be a finite number.")
     column.flags.writeable = False
     return column
 

@@ -139,7 +139,7 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     Raises
     ------
     InputError
-        When the model does not return one number for each measurement.
+        When the model returns no row of numbers. One that is too short or too long is a failed run.
     """
     start = perf_counter()
     result: dict[str, Any] = {"outputs": [], "error": ""}
@@ -162,10 +162,13 @@ def _checked(outputs: Any, run: ForwardRun) -> dict[str, Any]:
     except (TypeError, ValueError) as error:
         raise InputError(f"the forward model '{run.forward.name}' returns no array of numbers: {error}.") from error
     if values.shape != (len(run.control),):
-        raise InputError(
-            f"the forward model '{run.forward.name}' returns outputs of shape {values.shape}; there are "
-            f"{len(run.control)} measurements, and it must return one output for each."
+        difference = (
+            f"outputs of shape {values.shape}; there are {len(run.control)} measurements, and it must return one "
+            "output for each"
         )
+        if values.ndim == 1:  # a solver that stopped early, at these parameters alone
+            return {"error": difference}
+        raise InputError(f"the forward model '{run.forward.name}' returns {difference}.")
     if not np.isfinite(values).all():
         bad = np.flatnonzero(~np.isfinite(values))
         first = f"the first at the control {run.control[bad[0]]:g}"

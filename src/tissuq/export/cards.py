@@ -171,6 +171,10 @@ class Cards:
     blocks: tuple[str, ...] = ()
     outside: str = ""
 
+    def __repr__(self) -> str:
+        first, *_, last = [*self.files, *self.files]
+        return f"<Cards of {len(self.files)} draws: {first} to {last}>"
+
 
 class CardFormat(ABC):
     """A way to write draws for another program; a new one is one subclass in one file."""

@@ -96,7 +96,8 @@ def rank_tests(
     is_energy = model.discrepancy.is_energy and not model.is_correlated
     defaults = list(default_candidates(model.experiment, model.material, is_energy=is_energy, points=tuple(points)))
     requested = [
-        candidate if isinstance(candidate, Candidate) else candidate_named(candidate) for candidate in candidates
+        candidate if isinstance(candidate, Candidate) else candidate_named(candidate)
+        for candidate in ([candidates] if isinstance(candidates, str) else candidates)
     ]
     ranked = [*[candidate for candidate in defaults if candidate.is_repeat], *requested] if requested else defaults
     stable = _stable(solution, ranked)

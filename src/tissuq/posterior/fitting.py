@@ -176,6 +176,7 @@ def fit_many(
     >>> len(held)
     20
     """
+    _refuse_several(material, priors, reading.get("mode"))
     experiments = [measurements(data, OPTIONS, **reading) for data in datasets]
     if isinstance(tolerances, str):
         tolerances = Tolerances(tolerances)
@@ -219,3 +220,16 @@ def fit_many(
         solutions = solver.solve([models[number] for number in numbers])
         posteriors |= {number: Posterior(solution, solver) for number, solution in zip(numbers, solutions, strict=True)}
     return [posteriors[number] for number in range(len(datasets))]
+
+
+def _refuse_several(material: Any, priors: Any, mode: Any) -> None:
+    """Refuse several laws, priors that are not by parameter, and modes of several tests in place of one."""
+    if isinstance(material, str) and material == "all":
+        raise InputError("one fit has one material: tissuq.fit_laws(data) fits all of them and compares them.")
+    if priors is not None and not isinstance(priors, Mapping):
+        raise InputError(f"priors must be by parameter, such as {{'C10': tissuq.Uniform(0, 5)}}, not {priors!r}.")
+    if isinstance(mode, (list, tuple)):
+        raise InputError(
+            "mode is one for all tests that are read: give each its own in [tissuq.read(table, mode='uniaxial'), "
+            "tissuq.read(other, mode='planar')]."
+        )

@@ -101,6 +101,9 @@ class LawComparison:
     laws: Mapping[str, LawFit]
     skipped: Mapping[str, str]
 
+    def __repr__(self) -> str:
+        return f"<LawComparison of {', '.join(self.laws)}>"
+
     @property
     def fits(self) -> dict[str, Posterior]:
         """The posterior of every law, with the discrepancy."""

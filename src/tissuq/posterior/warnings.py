@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import isfinite
+from math import ceil, isfinite, log
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
-from tissuq.assessment.measurements import labels_of_tests
+from tissuq.assessment.measurements import falls, labels_of_tests
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.separability import inseparable_parameters
@@ -47,6 +47,8 @@ MIN_MEASUREMENTS = 12
 """Number of measurements from which a correlation of residuals is estimated."""
 MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS = 0.3, 4.0
 """Lag-1 correlation of residuals that is reported, and by how many standard errors (1 / sqrt(n)) it must exceed 0."""
+MAX_LEFT_CORRELATION = 0.2
+"""Correlation of errors that is left where a fit with fewer points is advised."""
 
 
 MAX_SDS_APART = 2.5
@@ -173,13 +175,21 @@ def warnings_about(
 def _instability(solution: Solution, stable_range: StableRange) -> ResultWarning:
     """Return the warning for a material that is rarely stable, in the loading mode in which it is least stable."""
     what = "material and discrepancy together are" if has_energy(solution.model) else "the material is"
-    how = "rarely stable" if stable_range.probability < MIN_LOSS_PROBABILITY else "unstable more often than stable"
+    share = f"stable in only {100 * stable_range.probability:.0f} % of the draws"
+    how = "rarely stable" if stable_range.probability < MIN_LOSS_PROBABILITY else share
     at_rest = " (already at rest)" if stable_range.loss.median == 1 else ""
     if at_rest and modulus(solution).mean < 0:
         at_rest = " (already at rest: the initial shear modulus is negative)"
+    finding = f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: "
+    if falls(solution.model.experiment):
+        return ResultWarning(
+            finding + "leave out where the measured stress falls, which no stable material does ({until_peak}).",
+            "unstable",
+            until_peak=True,
+        )
     return ResultWarning(
-        f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: measure in more "
-        "loading modes, choose another material, or restrict the fit to stable materials ({stable_in}).",
+        finding + "measure in more loading modes, choose another material, or restrict the fit to stable materials "
+        "({stable_in}).",
         "unstable",
         stable_in="all",
     )
@@ -198,11 +208,21 @@ def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning
     text = f"{finding}: the errors of consecutive measurements are not independent, and the intervals are too narrow. "
     if any(curve.is_back.any() for curve in model.experiment.curves):
         return ResultWarning(text + "Fit one branch of the cycle ({branch}).", "correlated-residuals", branch="loading")
+    every = _every_uncorrelated(lag1, min(len(curve) for curve in model.experiment.curves))
     if model.noise.is_consecutive:
-        return ResultWarning(text + "Fit with fewer points.", "correlated-residuals")
+        return ResultWarning(text + "Fit with fewer points ({every}).", "correlated-residuals", every=every)
     return ResultWarning(
-        text + "Fit with {noise}, or with fewer points.", "correlated-residuals", noise="autoregressive"
+        text + "Fit with {noise}, or with fewer points ({every}).",
+        "correlated-residuals",
+        noise="autoregressive",
+        every=every,
     )
+
+
+def _every_uncorrelated(lag1: float, points: int) -> int:
+    """Return how many points apart errors are hardly correlated; at most so many that enough of a curve's are used."""
+    apart = ceil(log(MAX_LEFT_CORRELATION) / log(min(lag1, 0.99)))
+    return max(2, min(apart, points // MIN_MEASUREMENTS))
 
 
 def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:

@@ -150,7 +150,7 @@ def finding_of(study: CalibrationStudy) -> str:
         return f"Not to be used: {NO_PARAMETERS_FIT}, and the intervals are of those that are least far from them."
     share = _share_of_emulator(study)
     size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
-    known = study.units
+    known = study.symbols_of_material | set(study.units)
     without_unit = [symbol for symbol in study.calibration.problem.forward_symbols if symbol not in known]
     units = f", {' and '.join(without_unit)} in the unit of the forward model" if without_unit else ""
     return f"Means, and intervals that hold 95 %{units}. The error of the emulator makes {size} of their variance."

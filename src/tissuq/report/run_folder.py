@@ -133,7 +133,8 @@ def _check(target: Path, command: str, force: bool) -> None:
         raise InputError(f"folder '{target}' contains files that are not a run; choose another folder with --out.")
     if not force:
         raise InputError(
-            f"run folder '{target}' already exists; choose another folder with --out, or replace it with --force."
+            f"run folder '{target}' already exists; choose another folder with --out, or replace it with --force "
+            "(in Python force=True)."
         )
     listed = listing.read_text(encoding="utf-8", errors="replace").splitlines()
     made_by = next((line.removeprefix(COMMAND_LINE) for line in listed[:1] if line.startswith(COMMAND_LINE)), command)

@@ -27,6 +27,7 @@ from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.units import PRESSURE, measured_in, stress_unit
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
+from tissuq.parameters.parameter import Parameter
 from tissuq.posterior.posterior import Posterior
 from tissuq.result_warning import ResultWarning
 from tissuq.studies.calibrate import calibrate
@@ -76,15 +77,23 @@ class CalibrationStudy:
     @property
     def units(self) -> dict[str, str]:
         """The units of parameters where they are known: of the material that is named, and of the noise."""
-        material = self.settings.material
-        parameters = () if material is None else material_named(material).parameters
-        of_material = {parameter.symbol: self.settings.unit for parameter in parameters if parameter.unit}
+        of_material = {parameter.symbol: self.settings.unit for parameter in self._parameters if parameter.unit}
         of_errors = {
             symbol_of(parameter.symbol, name): measured.units[0 if parameter.dimension == "stretch" else 1]
             for name, measured in self.data.items()
             for parameter in (*self.calibration.problem.discrepancy.parameters, NOISE_SD)
         }
         return of_material | {symbol: unit for symbol, unit in of_errors.items() if unit}
+
+    @property
+    def symbols_of_material(self) -> set[str]:
+        """The parameters of the material that is named: quantities of its unit of stress, and numbers."""
+        return {parameter.symbol for parameter in self._parameters}
+
+    @property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        material = self.settings.material
+        return () if material is None else material_named(material).parameters
 
     def label(self, symbol: str) -> str:
         """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""

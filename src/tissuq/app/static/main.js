@@ -103,7 +103,7 @@ const answer = (question, settings) => {
 const leave = question => { state.settled.add(question.text); showFound(state.found, state.reading, state.settled, { change, answer, leave }); };
 
 const showFiles = () => fill(byId("file-list"), ...state.files.map(file => {
-  const select = options(make("select", { aria: { label: `Loading mode of ${file}` } }), state.choices.modes.map(mode => mode.name), "loading mode: as the file says");
+  const select = options(make("select", { aria: { label: `Loading mode of ${file}` } }), state.choices.modes.map(({ name, words }) => ({ value: name, textContent: `${name}: ${words}` })), "loading mode: as the file says");
   select.value = state.modes[file] ?? "";
   select.addEventListener("change", () => { state.modes[file] = select.value; inspect(); });
   const remove = safely(async () => { state.files = (await request(own(`files/${encodeURIComponent(file)}`), { method: "DELETE" })).files; delete state.modes[file]; inspect(); });
