@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tissuq.arrays import BoolArray
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.next_step import Step, next_step
@@ -108,7 +106,7 @@ def answer_of(
     solution: Solution,
     ranges: Mapping[str, StableRange],
     warnings: Sequence[ResultWarning],
-    inside: NDArray[np.bool_],
+    inside: BoolArray,
 ) -> Answer:
     """Return the answer that a posterior gives.
 

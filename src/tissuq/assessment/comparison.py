@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.sensitivity import SCALE_FACTORS
 from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
@@ -187,8 +188,6 @@ def _check_average(fits: Mapping[str, Any]) -> None:
                 f"{fit.model.material.name}), whose parameters mean different things: average fits of one material."
             )
 
-
-FloatArray = NDArray[np.float64]
 
 INITIAL_SHEAR_MODULUS = "initial shear modulus"
 EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
@@ -373,7 +372,7 @@ def scores_of(
     return pd.DataFrame(rows)
 
 
-def _ranges(calibrated: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
+def _ranges(calibrated: BoolArray) -> dict[str, BoolArray]:
     """Return all measurements, and where some are beyond the calibrated range those on either side of its ends."""
     all_points = {"all": np.ones_like(calibrated)}
     ranges = {"calibrated": calibrated, "beyond": ~calibrated}

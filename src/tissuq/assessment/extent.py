@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.assessment.measurements import factors_of_tests, measurement_warnings
 from tissuq.assessment.modulus import modulus, modulus_symbols
@@ -33,7 +32,6 @@ from tissuq.prediction.moments import values_of
 
 __all__ = ["Assessment", "assess", "has_energy"]
 
-FloatArray = NDArray[np.float64]
 Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
 
 NEGLIGIBLE_INITIAL_SHARE = 1e-3

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points, widened
@@ -17,7 +17,6 @@ from tissuq.prediction.moments import coefficients, values_of
 
 __all__ = ["derived_marginal", "modulus", "modulus_moments", "modulus_symbols"]
 
-FloatArray = NDArray[np.float64]
 
 STRETCH_STEP = 1e-3
 """Step of the stretch for the initial slope."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.inference.solution import Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior, Uniform
@@ -15,7 +15,6 @@ from tissuq.prediction.densities import joint_log_likelihood, stride
 
 __all__ = ["SCALE_FACTORS", "PowerScaling", "known_evidence_changes", "power_scaling", "rescaled", "scale_symbols"]
 
-FloatArray = NDArray[np.float64]
 
 SCALE_FACTORS: dict[str, float] = {"quarter": 0.25, "fourfold": 4.0}
 """Factors of the prior scales of the discrepancy's amplitudes for which the influence of these priors is given."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.inference.solution import Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import coefficients, values_of
 
 __all__ = ["inseparable_parameters"]
 
-FloatArray = NDArray[np.float64]
 
 COMPONENTS = 4
 """Places of the posterior at which the stresses are looked at."""

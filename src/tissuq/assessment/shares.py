@@ -6,8 +6,8 @@ from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import States
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
@@ -15,7 +15,6 @@ from tissuq.prediction.moments import drawn_curves
 
 __all__ = ["shares_of_discrepancy"]
 
-FloatArray = NDArray[np.float64]
 Share: TypeAlias = tuple[float, float, float]
 """Mean, and ends of the 95 % interval."""
 

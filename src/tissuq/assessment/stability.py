@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import ImposedStretches, LoadingMode, States, curve_modes, loading_mode
@@ -39,8 +40,6 @@ __all__ = [
     "stable_ranges",
 ]
 
-FloatArray = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Curves = Callable[[States], FloatArray]
 
 STABILITY_DRAWS, POINTS_PER_SIDE = 500, 31
@@ -188,7 +187,7 @@ def stable_ranges(solution: Solution, reach: float = 1.0) -> dict[str, StableRan
     return ranges
 
 
-def are_stable(model: StatisticalModel, points: GaussianMixture, modes: Sequence[LoadingMode]) -> Flags:
+def are_stable(model: StatisticalModel, points: GaussianMixture, modes: Sequence[LoadingMode]) -> BoolArray:
     """Return whether draws (M,) are stable over the measured range of all of some loading modes.
 
     Parameters
@@ -217,12 +216,12 @@ def stability_modes(material: Material) -> list[LoadingMode]:
 
 
 def stable_draws(
-    curves_of: Callable[[NDArray[np.intp]], Curves],
-    is_isotropic: Flags,
+    curves_of: Callable[[IndexArray], Curves],
+    is_isotropic: BoolArray,
     data: Experiment,
     modes: Sequence[LoadingMode],
     reach: float = 1.0,
-) -> Flags:
+) -> BoolArray:
     """Return whether draws (N,) are stable over the range that data measured, of all of some loading modes.
 
     Parameters
@@ -287,8 +286,8 @@ def _curves(model: StatisticalModel, mixture: GaussianMixture) -> Curves:
 
 
 def _criteria(
-    curves: Curves, mode: LoadingMode, stretch: FloatArray, is_isotropic: Flags
-) -> tuple[Flags, Flags, Flags]:
+    curves: Curves, mode: LoadingMode, stretch: FloatArray, is_isotropic: BoolArray
+) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each.
 
     The first is no condition of a draw (M,) that has a preferred direction.
@@ -321,7 +320,7 @@ def calibrated_range(model: StatisticalModel, mode: LoadingMode, *, is_directed:
 
 def is_calibrated(
     model: StatisticalModel, mode: LoadingMode, points: FloatArray, *, is_directed: bool = False
-) -> Flags:
+) -> BoolArray:
     """Return at which points of a mode, (g,) or (g, c), the state is among those that were measured.
 
     With one control that is `calibrated_range`.
@@ -356,7 +355,7 @@ def measured_range(data: Experiment, mode: LoadingMode, states: MeasuredStates |
     return farthest_stretch(mode, states, -1), farthest_stretch(mode, states, 1)
 
 
-def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:
+def _from_reference(change: FloatArray, is_stable: BoolArray) -> BoolArray:
     """Return whether all is stable (M, g) from the reference to each change (g,) of the stretch."""
     stable = np.empty_like(is_stable)
     for outward in (_outward(change, -1), _outward(change, 1)):
@@ -364,19 +363,19 @@ def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:
     return stable
 
 
-def _outward(change: FloatArray, side: int) -> NDArray[np.intp]:
+def _outward(change: FloatArray, side: int) -> IndexArray:
     """Return the places of the changes on one side of the reference, and of the reference, from there outward."""
     indices = np.flatnonzero(side * change >= 0)
     return indices[np.argsort(np.abs(change[indices]))]
 
 
-def _surely_stable(stretch: FloatArray, stable: Flags) -> tuple[float, float]:
+def _surely_stable(stretch: FloatArray, stable: BoolArray) -> tuple[float, float]:
     """Return the stretches between which the probability of a loss of stability is small."""
     sure = stretch[stable.mean(axis=0) >= 1 - MIN_LOSS_PROBABILITY]
     return float(sure.min(initial=1.0)), float(sure.max(initial=1.0))
 
 
-def _loss(stretch: FloatArray, stable: Flags, side: int) -> Loss:
+def _loss(stretch: FloatArray, stable: BoolArray, side: int) -> Loss:
     """Return the loss of stability of draws (M, g) on one side of the reference."""
     outward = _outward(stretch - 1, side)
     first_unstable = np.argmin(stable[:, outward], axis=1)[~stable[:, outward[-1]]]

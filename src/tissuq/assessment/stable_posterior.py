@@ -7,8 +7,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.assessment.stability import are_stable
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
@@ -20,7 +20,6 @@ from tissuq.prediction.moments import values_of
 
 __all__ = ["ALL_MODES", "modes_named", "stable_part"]
 
-FloatArray = NDArray[np.float64]
 
 ALL_MODES = "all"
 """Name that stands for every loading mode."""
@@ -140,7 +139,7 @@ def _stable_draws(
     return draws.weighted(np.full(stable_count, 1 / stable_count)), draw_count
 
 
-def _as_points(settings: FloatArray, linear: FloatArray, member: NDArray[np.intp] | None = None) -> GaussianMixture:
+def _as_points(settings: FloatArray, linear: FloatArray, member: IndexArray | None = None) -> GaussianMixture:
     """Return draws (M, d) and (M, p) as components without width."""
     return GaussianMixture.of_points(np.full(len(linear), 1 / len(linear)), settings, linear, member)
 

@@ -7,8 +7,8 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.modulus import modulus_symbols
 from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.stability import StableRange
@@ -78,7 +78,7 @@ def uses_of(
     stiffness: Marginal,
     ranges: Mapping[str, StableRange],
     warnings: Sequence[ResultWarning],
-    inside: NDArray[np.bool_],
+    inside: BoolArray,
 ) -> tuple[Use, ...]:
     """Return for what a posterior with this initial shear modulus can be used; the others as in `answer_of`."""
     codes = {w.code for w in warnings if w.code != "measurements" or w.severity is not Severity.NOTE}
@@ -266,7 +266,7 @@ def _other_modes(
     return verdict, sentence
 
 
-def _compression_and_tension(stable_range: StableRange) -> list[NDArray[np.float64]]:
+def _compression_and_tension(stable_range: StableRange) -> list[FloatArray]:
     """Return stretches over a range, those below 1 apart from those above it where it has both."""
     low, high = stable_range.low, stable_range.high
     ends = [(low, 1.0), (1.0, high)] if low < 1 < high else [(low, high)]

@@ -23,7 +23,6 @@ from tissuq.errors import InputError
 
 __all__ = ["AbaqusDeck", "AbaqusResults", "Keyword", "keywords_of"]
 
-FloatArray = NDArray[np.float64]
 
 ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
 """Options of a material that a card replaces."""

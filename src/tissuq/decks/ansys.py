@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, decoded, lines_of
 from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
 
 __all__ = ["AnsysDeck", "AnsysResults"]
 
-FloatArray = NDArray[np.float64]
 
 ELASTIC_TABLES = {"HYPE", "ELAS", "ANEL", "AHYP"}
 """Tables (TB) that a card replaces, by the four letters that the program reads."""

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
 
 __all__ = ["FEBioResults", "PlotFile", "read_plot_file"]
 
-FloatArray = NDArray[np.float64]
 
 # The facts of the format are those of FEBio's source, github.com/febiosoftware/FEBio at 0e8b7db: tags and what is
 # written below them in FEBioPlot/FEBioPlotFile.h and .cpp, chunks and their compression in FEBioPlot/PltArchive.h and

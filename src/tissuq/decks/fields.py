@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.decks.calculix_results import Frd, tensor_of
 from tissuq.decks.quantity import Curve, von_mises
 
 __all__ = ["FinalFields", "element_invariants", "final_fields", "share_beyond"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

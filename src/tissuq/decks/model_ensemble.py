@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.decks.model_run import ModelRun
 from tissuq.decks.result_file import SAME_TIME
 from tissuq.errors import ConvergenceError
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FailedRun", "ModelEnsemble", "gathered", "on_common_times"]
 
-FloatArray = NDArray[np.float64]
 
 TIMES = 41
 """Common times of curves whose solver chose its increments draw by draw."""

@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.decks.result_file import ALL, TENSOR, Results, result_files
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import UserCode
 
 __all__ = ["Component", "Curve", "FunctionQuantity", "Quantity", "parse_quantity", "von_mises"]
 
-FloatArray = NDArray[np.float64]
 
 SPECIFICATION = re.compile(r"(?P<component>[A-Za-z]+\d*)(@(?P<set>[^:]+))?(:(?P<how>\w+))?")
 HOW_TO_WRITE = "write NAME=RF3@SET, NAME=U2@SET:max, NAME=S11@SET, NAME=MISES@SET:max, or NAME=file.py:function"

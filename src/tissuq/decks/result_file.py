@@ -13,12 +13,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.registry import plugins, variants
 
 __all__ = ["ALL", "AS_TENSOR", "SAME_TIME", "TENSOR", "ResultFile", "Results", "Values", "result_files", "unknown_set"]
 
-FloatArray = NDArray[np.float64]
 
 ALL = "ALL"
 """The set of all nodes, where none is named."""
@@ -158,7 +158,7 @@ class ResultFile(ABC):
         values = self.field(kind)
         return None if values is None else Values(values.times, values.values[:, self._rows(set_name)])
 
-    def _rows(self, set_name: str) -> NDArray[np.bool_]:
+    def _rows(self, set_name: str) -> BoolArray:
         members = self.node_sets.get(set_name)
         if members is None and set_name != ALL:
             raise InputError(unknown_set(set_name, self.node_sets))

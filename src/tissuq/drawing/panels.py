@@ -9,8 +9,9 @@ from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.drawing.style import COLUMN, PAGE, PAPER, STYLE, new_figure
 from tissuq.errors import InputError
 
@@ -242,7 +243,7 @@ def limits_of(core: Sequence[ArrayLike], beyond: Sequence[ArrayLike], margin: fl
     return low - air, high + air
 
 
-def within(values: ArrayLike, limits: tuple[float, float]) -> NDArray[np.float64]:
+def within(values: ArrayLike, limits: tuple[float, float]) -> FloatArray:
     """Return values cut where they have long left an axis: no renderer takes any number."""
     low, high = limits
     return np.clip(np.asarray(values, dtype=np.float64), low - 5 * (high - low), high + 5 * (high - low))

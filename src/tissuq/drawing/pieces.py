@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.drawing.style import BAND, BASE, INK, relative_size
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["band", "cut_off", "density", "forest", "heat", "line", "outside", "points", "rows"]
 
-FloatArray = NDArray[np.float64]
 
 EDGE = "end of the measured strains"
 """What the dashed line is where a hatched part begins."""
@@ -69,7 +69,7 @@ def points(
     error: FloatArray | None = None,
     label: str = "measured",
     marker: str = "o",
-    is_back: NDArray[np.bool_] | None = None,
+    is_back: BoolArray | None = None,
     **looks: Any,
 ) -> None:
     """Draw measurements, with their standard errors where there are any; of very many the mean and 95 % of bins.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator, emulate, runs_needed
 from tissuq.emulation.kriging import Kernel, Trend
@@ -19,7 +19,6 @@ from tissuq.parameters.checks import check_seed
 
 __all__ = ["EmulationSettings", "Runner", "calibrated"]
 
-FloatArray = NDArray[np.float64]
 
 Runner = Callable[[FloatArray], ForwardRuns]
 """A function that runs a forward model at parameters (N, d)."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "labelled_arrays"]
 
-FloatArray = NDArray[np.float64]
 
 PREDICTION_DRAWS = 1000
 """Number of draws of the posterior in predictions."""

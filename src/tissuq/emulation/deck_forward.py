@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.decks import Deck, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_files import MODEL, copy_model, extra_files
 from tissuq.decks.model_run import (
@@ -35,7 +35,6 @@ from tissuq.mechanics import Material, material_named
 
 __all__ = ["DeckForward", "check_unit_of_function", "conversion"]
 
-FloatArray = NDArray[np.float64]
 
 SOLVED = "solver"
 """Folder with a folder for each run of the solver."""

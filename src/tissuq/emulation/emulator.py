@@ -8,8 +8,9 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.emulation.kriging import (
     Kernel,
     Kriging,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
 
-FloatArray = NDArray[np.float64]
 
 LEADING_DIRECTIONS = 2
 """Number of directions of the outputs for which coordinates are chosen."""
@@ -51,7 +51,7 @@ class Coordinates:
 
     low: FloatArray
     high: FloatArray
-    is_log: NDArray[np.bool_]
+    is_log: BoolArray
 
     def of(self, values: Any) -> Any:
         """Return points (..., d) of the box at parameters (..., d), NumPy or JAX."""
@@ -298,7 +298,7 @@ def _emulator_on(
     runs: ForwardRuns,
     control: FloatArray,
     basis: OutputBasis,
-    may_be_log: NDArray[np.bool_],
+    may_be_log: BoolArray,
     form: tuple[Kernel, Trend],
 ) -> Emulator:
     """Return the emulator with the coordinates that make the leading scores of the runs most probable."""
@@ -310,7 +310,7 @@ def _emulator_on(
 
 
 def _best_coordinates(
-    points: FloatArray, scores: FloatArray, may_be_log: NDArray[np.bool_], form: tuple[Kernel, Trend]
+    points: FloatArray, scores: FloatArray, may_be_log: BoolArray, form: tuple[Kernel, Trend]
 ) -> tuple[Coordinates, list[Mode]]:
     """Return the coordinates that make scores (m, q) most probable, and the modes of their length scales.
 
@@ -319,7 +319,7 @@ def _best_coordinates(
     """
     fits: dict[tuple[bool, ...], tuple[float, Coordinates, list[Mode]]] = {}
 
-    def log_evidence(is_log: NDArray[np.bool_]) -> float:
+    def log_evidence(is_log: BoolArray) -> float:
         key = tuple(is_log.tolist())
         if key not in fits:
             coordinates = _box(points, is_log)
@@ -349,7 +349,7 @@ def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
     return smallest > 0 and low - np.log(smallest) <= MAX_DISTANCE_BELOW * (high - low)
 
 
-def _box(points: FloatArray, is_log: NDArray[np.bool_]) -> Coordinates:
+def _box(points: FloatArray, is_log: BoolArray) -> Coordinates:
     """Return the unit box of points (m, d), of some parameters by their logarithms."""
     values = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
     low, high = values.min(axis=0), values.max(axis=0)

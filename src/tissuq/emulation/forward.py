@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.mechanics.user_law import UserCode
 
@@ -29,7 +29,6 @@ __all__ = [
     "as_forward",
 ]
 
-FloatArray = NDArray[np.float64]
 
 ADVICE = (
     "Write a function forward(parameters) of a dictionary of parameters by name, or forward(parameters, control), that "

@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.inference.quasi_monte_carlo import quasi_random
 
 __all__ = [
@@ -30,7 +30,6 @@ __all__ = [
     "trend_basis",
 ]
 
-FloatArray = NDArray[np.float64]
 
 Kernel = Literal["squared-exponential", "matern-5/2"]
 Trend = Literal["constant", "linear", "quadratic"]
@@ -274,7 +273,7 @@ class SettingTerms:
 
 def fitted(
     points: FloatArray, values: FloatArray, kernel: Kernel, trend: Trend, near: Sequence[Mode] = ()
-) -> tuple[Kriging, NDArray[np.bool_]]:
+) -> tuple[Kriging, BoolArray]:
     """Return the processes of functions known at points of the unit box, and which functions (q,) these are.
 
     Functions that a process does not predict from the other points are left out, and so are all that follow the

@@ -11,8 +11,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import block_diag, cho_solve, solve_triangular
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation.emulator import Emulator, emulated
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import PriorCorrelation, Problem, symbol_of
@@ -24,7 +24,6 @@ jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
 __all__ = ["Likelihood"]
 
-FloatArray = NDArray[np.float64]
 
 BLOCK_SIZE = 256
 """Number of parameter settings computed at once, which bounds the memory."""

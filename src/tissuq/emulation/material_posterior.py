@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.stability import measured_range
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -118,9 +118,7 @@ def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float
     return Ensemble((EnergyDraw(0, ((law, values),), None),), model, (), 1, ranges)
 
 
-def _experiment(
-    law: Material, values: NDArray[np.float64], loading: LoadingMode, stretch: tuple[float, float]
-) -> Experiment:
+def _experiment(law: Material, values: FloatArray, loading: LoadingMode, stretch: tuple[float, float]) -> Experiment:
     """Return the mean stress of parameters (N, k) at points of a range, which stand for what was measured."""
     loading, points = points_of_range(law, loading, stretch)
     stresses = [engineering_stress(law, path, points, values).mean(axis=0) for path in loading.paths]
@@ -135,7 +133,7 @@ def _model(experiment: Experiment, law: Material, priors: Mapping[str, Prior] | 
 
 def points_of_range(
     law: Material, mode: str | LoadingMode, stretch: tuple[float, float]
-) -> tuple[LoadingMode, NDArray[np.float64]]:
+) -> tuple[LoadingMode, FloatArray]:
     """Return a loading mode and points (n,) or (n, 2) of it, over which a law is known.
 
     Of a law with fibres these are points of a sheet that is stretched along one axis, the other, and both: most modes

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tissuq.arrays import BoolArray, FloatArray
 
 __all__ = ["OutputBasis", "basis_of", "has_signs", "output_moments"]
 
-FloatArray = NDArray[np.float64]
 
 MAX_TRUNCATED_SHARE = 1e-10
 """Largest share of the outputs' variance in the directions that are truncated."""
@@ -47,7 +47,7 @@ class OutputBasis:
         """Whether it is one of logarithms."""
         return self.signs is not None
 
-    def truncated_to(self, is_kept: NDArray[np.bool_]) -> OutputBasis:
+    def truncated_to(self, is_kept: BoolArray) -> OutputBasis:
         """Return the basis of some of its directions (q,); the others become part of the remainder."""
         dropped = self.directions[:, ~is_kept]
         return replace(self, directions=self.directions[:, is_kept], truncated=self.truncated + dropped @ dropped.T)

@@ -11,8 +11,9 @@ from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.model.discrepancy import Discrepancy, GaussianProcess, NoDiscrepancy, PinnedProcess
 from tissuq.model.noise import NOISE_SD
@@ -21,7 +22,6 @@ from tissuq.parameters.priors import Flat, LogNormal, Normal, Prior
 
 __all__ = ["DISCREPANCIES", "Method", "PriorCorrelation", "Problem", "correlated", "is_far", "pose", "symbol_of"]
 
-FloatArray = NDArray[np.float64]
 
 Method = Literal["auto", "importance", "nuts"]
 """Method that finds the posterior: importance sampling, NUTS, or (auto) NUTS where importance sampling fails."""

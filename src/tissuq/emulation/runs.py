@@ -10,8 +10,8 @@ from time import perf_counter
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.problem import PriorCorrelation
 from tissuq.errors import InputError
@@ -29,7 +29,6 @@ __all__ = [
     "space_filling",
 ]
 
-FloatArray = NDArray[np.float64]
 
 PointSet = Literal["sobol", "latin"]
 """Scrambled Sobol points, or a Latin hypercube whose points stay apart."""
@@ -204,7 +203,7 @@ class ForwardRuns:
         return len(self.points)
 
     @cached_property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> BoolArray:
         """Which runs failed: (N,) array."""
         return np.array([bool(error) for error in self.errors])
 

@@ -8,8 +8,8 @@ from functools import cached_property, partial
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation.likelihood import Likelihood, log_posterior
 from tissuq.emulation.problem import Method
 from tissuq.errors import ConvergenceError, InputError
@@ -21,7 +21,6 @@ from tissuq.parameters.priors import Prior
 
 __all__ = ["SampledPosterior", "sample_posterior"]
 
-FloatArray = NDArray[np.float64]
 
 SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 16, 32
 """Points of a search round; points of a sampling round, the number of these, and where it does not suffice, at most."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem, is_far
 from tissuq.emulation.runs import EmulatorCheck
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["NO_PARAMETERS_FIT", "calibration_warnings"]
 
-FloatArray = NDArray[np.float64]
 Ends = list[tuple[str, str]]
 """Parameters, and of each the lower or the upper end."""
 

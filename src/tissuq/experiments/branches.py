@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from tissuq.arrays import BoolArray
 
 __all__ = ["REVERSAL", "turning_points", "unloading"]
 
@@ -35,7 +37,7 @@ def turning_points(stretch: ArrayLike) -> list[int]:
     return turns
 
 
-def unloading(points: ArrayLike, reference: ArrayLike) -> NDArray[np.bool_]:
+def unloading(points: ArrayLike, reference: ArrayLike) -> BoolArray:
     """Return which measurements (n,) were made on the way back to rest, after a way there.
 
     None of a test with several controls, and of one that only ever goes on.

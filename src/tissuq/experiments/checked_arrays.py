@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.numbers import number_and_unit
@@ -30,7 +31,6 @@ __all__ = [
     "stress_in_mpa",
 ]
 
-FloatArray = NDArray[np.float64]
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken, or percent are meant."""
 LEAST_PERCENT = 30.0

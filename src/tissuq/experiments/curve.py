@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.drawing.panels import Panels, shortened, small_panels
 from tissuq.drawing.pieces import points
 from tissuq.drawing.style import BASE, inline_svg, relative_size
@@ -18,7 +18,6 @@ from tissuq.experiments.units import stress_unit
 
 __all__ = ["Curve", "draw_curves", "small_svg"]
 
-FloatArray = NDArray[np.float64]
 
 MOST_SMALL = 2
 """Curves of a notebook's figure at the most."""
@@ -89,7 +88,7 @@ class Curve:
         return points if points.ndim == 1 else np.asarray(points[:, self.drawn_against])
 
     @property
-    def is_back(self) -> NDArray[np.bool_]:
+    def is_back(self) -> BoolArray:
         """Which measurements (n,) are of unloading."""
         return unloading(self.points, self.mode.reference)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import agree, checked, checked_points, in_mpa
@@ -21,8 +22,6 @@ from tissuq.experiments.units import StressUnit
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
 __all__ = ["Experiment"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)

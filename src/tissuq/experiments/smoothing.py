@@ -6,11 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tissuq.arrays import FloatArray, IndexArray
 
 __all__ = ["Smoothed", "scatter", "smoothed"]
 
-FloatArray = NDArray[np.float64]
 
 MAX_KNOTS = 2000
 """Number of different stretches at most between which a curve is smoothed."""
@@ -63,7 +63,7 @@ def scatter(abscissa: FloatArray, stress: FloatArray) -> float | None:
     return float(np.sqrt((differences**2).mean()))
 
 
-def _averaged(abscissa: FloatArray, stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
+def _averaged(abscissa: FloatArray, stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, IndexArray]:
     """Return different abscissas, mean stresses and numbers of measurements there, and at which of them each one is."""
     knots, group, count = np.unique(abscissa, return_inverse=True, return_counts=True)
     if len(knots) > MAX_KNOTS:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.units import stress_unit
 from tissuq.export.states import SeenStates
@@ -247,7 +247,7 @@ def words_of(draw: EnergyDraw, settings: CardSettings) -> str:
     return ", ".join(f"{symbol} = {value:.6g}" for symbol, value in _parameters(draw, settings).items())
 
 
-def distances_from_median(ensemble: Ensemble) -> NDArray[np.float64]:
+def distances_from_median(ensemble: Ensemble) -> FloatArray:
     """Return how far draws (N,) are from the median of all: root mean square difference of stresses in the seen states.
 
     Relative to the sizes of the medians; the draw with the smallest is the most typical.

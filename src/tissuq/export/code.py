@@ -9,8 +9,8 @@ from textwrap import wrap
 from typing import ClassVar, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.export.cards import (
     NEARLY,
@@ -44,7 +44,6 @@ from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["Card", "FECode"]
 
-FloatArray = NDArray[np.float64]
 
 COMMENT_WIDTH = 110
 """Largest number of characters in a line of comment."""

@@ -7,8 +7,8 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.experiments.modes import LoadingMode, Path, curve_modes
 from tissuq.export.stability_rows import StabilityStates, least_eigenvalues, wanted_stiffness
 from tissuq.export.states import PrincipalStates, SeenStates, are_stable, mode_stretches, moduli, states_between
@@ -17,7 +17,6 @@ from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["REACHES", "DrawStresses", "Judged", "within"]
 
-FloatArray = NDArray[np.float64]
 
 REACHES = (1.0, 1.25, 1.5)
 """Multiples of the measured I1 - 3 and I2 - 3 up to which errors of cards are stated; cards are fitted to the last."""
@@ -53,7 +52,7 @@ class DrawStresses:
         return moduli(self.ensemble)
 
     @cached_property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> BoolArray:
         """Whether draws (N,) are stable themselves over the range that was measured."""
         return are_stable(self.ensemble)
 
@@ -65,7 +64,7 @@ class DrawStresses:
         return PrincipalStates(np.concatenate([shell.logs for shell in shells]))
 
     @cached_property
-    def shell(self) -> NDArray[np.intp]:
+    def shell(self) -> IndexArray:
         """The number of the first of `REACHES` that the state of a point (n,) is within."""
         largest = self._relative_invariants(self.states.logs)
         return np.tile(np.searchsorted(np.array(REACHES) * (1 + 1e-9), largest), 3)

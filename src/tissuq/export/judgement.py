@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.export.draw_stresses import REACHES, DrawStresses, within
 from tissuq.export.laws import Form, Law
 from tissuq.export.nearest_law import WANTED_ERROR
@@ -18,7 +18,6 @@ from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["JudgedLaw"]
 
-FloatArray = NDArray[np.float64]
 
 TOO_FAR = 0.1
 """Root mean square error of the stresses that were measured above which a card does not stand for its draw."""
@@ -47,8 +46,8 @@ class JudgedLaw:
     form: Form
     projection: Projection | None
     errors: Mapping[str, FloatArray]
-    stable: NDArray[np.bool_]
-    stable_beyond: NDArray[np.bool_]
+    stable: BoolArray
+    stable_beyond: BoolArray
 
     @classmethod
     def of_draws(cls, ensemble: Ensemble, law: Law, form: Form) -> JudgedLaw:
@@ -65,7 +64,7 @@ class JudgedLaw:
         return cls(complete, form, projection, errors, *_stable(complete, draws.ensemble))
 
     @property
-    def is_near(self) -> NDArray[np.bool_]:
+    def is_near(self) -> BoolArray:
         """Which cards (N,) are within 1 % in every state that was measured."""
         return np.asarray(self.errors[within(1)].max(axis=1) <= WANTED_ERROR)
 
@@ -174,7 +173,7 @@ class JudgedLaw:
             )
 
 
-def _stable(law: Law, like: Ensemble) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _stable(law: Law, like: Ensemble) -> tuple[BoolArray, BoolArray]:
     """Return whether draws of a law in the place of others are stable, as measured and up to the last of `REACHES`."""
     cards = law.ensemble(like)
     return are_stable(cards), are_stable(cards, REACHES[-1])

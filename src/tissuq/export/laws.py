@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.mechanics import Material
 from tissuq.mechanics.laws import (
     Biderman,
@@ -42,7 +42,6 @@ __all__ = [
     "summands",
 ]
 
-FloatArray = NDArray[np.float64]
 Constants = dict[str, float]
 
 POLYNOMIALS = Biderman, Isihara, MooneyRivlin, NeoHookean, Rivlin, Yeoh

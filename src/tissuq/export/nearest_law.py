@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.stability_rows import Inequalities, StabilityRows
 
@@ -21,7 +21,6 @@ __all__ = [
     "squared_distance",
 ]
 
-FloatArray = NDArray[np.float64]
 
 WEIGHTS_BEYOND = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Weights of states beyond the measured ones, of which the heaviest is taken that costs little inside."""

@@ -9,8 +9,9 @@ from itertools import combinations
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import SimpleShear
 from tissuq.export.draw_stresses import DrawStresses
@@ -32,7 +33,6 @@ __all__ = [
     "reduced_terms",
 ]
 
-FloatArray = NDArray[np.float64]
 
 LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
 """Multiples of one step among which Ogden's exponents are chosen."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.modes import States, curve_modes
 from tissuq.export.states import SeenStates
 from tissuq.mechanics import Material, stress_basis
@@ -15,7 +16,6 @@ from tissuq.mechanics.rays import through
 
 __all__ = ["Inequalities", "StabilityRows", "StabilityStates", "least_eigenvalues", "wanted_stiffness"]
 
-FloatArray = NDArray[np.float64]
 Inequalities = tuple[FloatArray, FloatArray]
 """Rows (m, k) and bounds (m,): rows x >= bounds."""
 
@@ -70,7 +70,7 @@ def least_eigenvalues(hessian: FloatArray) -> FloatArray:
 
 
 def wanted_stiffness(
-    states: StabilityStates, is_beyond: NDArray[np.bool_], least_stiffness: FloatArray, modulus: float
+    states: StabilityStates, is_beyond: BoolArray, least_stiffness: FloatArray, modulus: float
 ) -> FloatArray:
     """Return the smallest stiffness (n,) that a law may have in states, where a draw has the least one (n,), MPa.
 

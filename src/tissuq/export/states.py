@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.assessment.stability import stability_modes, stable_draws
 from tissuq.experiments.modes import Deformation, Path, SimpleShear
 from tissuq.export.laws import matrix_and_fibres
@@ -27,7 +27,6 @@ __all__ = [
     "states_between",
 ]
 
-FloatArray = NDArray[np.float64]
 
 ANGLES = (1.0, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 59.0)
 """Lode angles in degrees: from uniaxial tension, 0, by planar tension, 30, to equibiaxial tension, 60.
@@ -124,10 +123,10 @@ def initial_slope(stress: FloatArray) -> FloatArray:
     return np.asarray((4 * near - far) / 3)
 
 
-def are_stable(ensemble: Ensemble, reach: float = 1.0) -> NDArray[np.bool_]:
+def are_stable(ensemble: Ensemble, reach: float = 1.0) -> BoolArray:
     """Return whether draws (N,) are stable in every mode of one stretch, to so many times the measured invariants."""
 
-    def curves_of(indices: NDArray[np.intp]) -> Any:
+    def curves_of(indices: IndexArray) -> Any:
         selected = replace(ensemble, draws=tuple(ensemble[int(index)] for index in indices))
         return selected.stresses_at
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.export.cards import (
     CardFormat,
@@ -23,7 +23,6 @@ from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["Table"]
 
-FloatArray = NDArray[np.float64]
 
 ANGLES = (0.02, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 59.98)
 """Lode angles, degrees; the ends are so near to uniaxial and equibiaxial tension that nothing of note has changed."""

@@ -7,10 +7,10 @@ from math import ceil, log
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import ACROSS, AXIAL, Case, FloatArray, Mesh, RigidTip, Supports
+from tissuq.finite_elements.case import ACROSS, AXIAL, Case, Mesh, RigidTip, Supports
 
 __all__ = ["ClampedBar", "Indentation", "PlateWithHole", "SphericalIndentation", "graded", "grid"]
 
@@ -86,7 +86,7 @@ class ClampedBar(Case):
 Contact = Literal["bonded", "frictionless"]
 
 
-def _surface_and_base(points: FloatArray, height: float, radius: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _surface_and_base(points: FloatArray, height: float, radius: float) -> tuple[BoolArray, BoolArray]:
     """Return which points of a disc on its base lie on its surface (n,), and which directions of them are held (n, 2).
 
     The base is held, and the axis in its place.

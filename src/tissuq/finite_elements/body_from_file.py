@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import ClassVar, Literal, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import AXIAL, Case, FloatArray, Inflation, Mesh, RigidTip, Supports
+from tissuq.finite_elements.case import AXIAL, Case, Inflation, Mesh, RigidTip, Supports
 from tissuq.finite_elements.mesh_file import AXES, NEARLY, MeshFile, deck_text, read_mesh
 
 __all__ = ["BodyFromFile", "InflatedBody"]
@@ -151,7 +151,7 @@ class BodyFromFile(Case):
         """The sets that do something, besides those that are held."""
         return (self.move or self.press,)
 
-    def _held(self, points: FloatArray) -> NDArray[np.bool_]:
+    def _held(self, points: FloatArray) -> BoolArray:
         """Return which displacements of points are held."""
         sets, columns, fixed = self._mesh_and_sets()[1], self._columns, np.zeros(points.shape, dtype=bool)
         for name, axes in (self.hold or {}).items():
@@ -180,7 +180,7 @@ class BodyFromFile(Case):
     def _found(self) -> MeshFile:
         return _read_once(self.file, self.digest)
 
-    def _mesh_and_sets(self) -> tuple[Mesh, Mapping[str, NDArray[np.intp]]]:
+    def _mesh_and_sets(self) -> tuple[Mesh, Mapping[str, IndexArray]]:
         return _mesh_once(self.file, self.digest, self._columns, self.shape), self._found().sets
 
     def _check_cells(self) -> None:

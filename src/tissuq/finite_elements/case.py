@@ -8,8 +8,8 @@ from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.registry import variants
 
@@ -27,7 +27,6 @@ __all__ = [
     "felupe",
 ]
 
-FloatArray = NDArray[np.float64]
 
 AXIAL, ACROSS = 0, 1
 """Columns of points and displacements."""
@@ -91,7 +90,7 @@ class Mesh(NamedTuple):
     """
 
     points: FloatArray
-    cells: NDArray[np.intp]
+    cells: IndexArray
     is_plane: bool = False
     is_half: bool = True
     xyz: tuple[int, ...] = ()
@@ -139,7 +138,7 @@ class Mesh(NamedTuple):
         return "The body" if self.is_plane else "The side of the body across its thinnest direction"
 
     @property
-    def section(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def section(self) -> tuple[IndexArray, IndexArray]:
         """Faces (p, 3 or 4) by their points that show a section, and the cells (p,) that they are of: the lowest."""
         faces = np.concatenate([self.cells[:, face] for face in self.kind.faces])
         lowest = self.points[:, 2:].min(axis=0)
@@ -160,7 +159,7 @@ class RigidTip(NamedTuple):
         Of a sphere whose centre is on the axis; infinite: a plane across it.
     """
 
-    points: NDArray[np.bool_]
+    points: BoolArray
     start: float
     radius: float = inf
 
@@ -178,8 +177,8 @@ class Inflation(NamedTuple):
         Its direction, a column of the points.
     """
 
-    points: NDArray[np.bool_]
-    watched: NDArray[np.bool_]
+    points: BoolArray
+    watched: BoolArray
     column: int
 
 
@@ -200,8 +199,8 @@ class Supports(NamedTuple):
         What is pressed against the body, or the pressure on it.
     """
 
-    fixed: NDArray[np.bool_]
-    moved: NDArray[np.bool_]
+    fixed: BoolArray
+    moved: BoolArray
     direction: float
     parts: float = 1.0
     load: RigidTip | Inflation | None = None

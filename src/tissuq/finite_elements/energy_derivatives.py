@@ -12,15 +12,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.mechanics import FibreMaterial
 from tissuq.mechanics.stress import differentiator
 
 __all__ = ["FibreEnergy", "Fibres", "gradient", "gradient_and_hessian", "is_arithmetic"]
 
-FloatArray = NDArray[np.float64]
 IsochoricEnergy = Callable[[tuple[Any, Any, Any]], Any]
 """An energy (n,) of three principal stretches (n,) whose product is one."""
 Fibres = tuple[tuple[FibreMaterial, tuple[float, ...]], ...]

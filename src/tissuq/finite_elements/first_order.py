@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements.case import Case
 from tissuq.finite_elements.material import distortional_energy
@@ -28,7 +28,6 @@ from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
 __all__ = ["FirstOrder", "FirstOrderError", "controlled", "draws_in_full", "first_order_forces"]
 
-FloatArray = NDArray[np.float64]
 
 EXACT = 1e-12
 """Unevenness below which a draw is proportional to the reference."""
@@ -178,11 +177,11 @@ def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> 
 
 
 def _at_step(
-    plain: FloatArray, uneven: FloatArray, softens: NDArray[np.bool_], full: FloatArray, numbers: NDArray[np.intp]
+    plain: FloatArray, uneven: FloatArray, softens: BoolArray, full: FloatArray, numbers: IndexArray
 ) -> tuple[FloatArray, tuple[float, float, float]]:
     """Return the forces (N,) at a step, and the errors of one that is not in full, of their mean and of their sd."""
 
-    def factors(usable: NDArray[np.intp]) -> FloatArray:
+    def factors(usable: IndexArray) -> FloatArray:
         lack = full[usable] / plain[usable] - 1
         return _factors(uneven, softens, uneven[usable], lack, softens[usable])
 
@@ -217,9 +216,7 @@ def _at_step(
     )
 
 
-def _factors(
-    uneven: FloatArray, softens: NDArray[np.bool_], near: FloatArray, lack: FloatArray, side: NDArray[np.bool_]
-) -> FloatArray:
+def _factors(uneven: FloatArray, softens: BoolArray, near: FloatArray, lack: FloatArray, side: BoolArray) -> FloatArray:
     """Return what draws (N,) lack in their unevenness, from that of some (n,); zero where there are none."""
     factors = np.zeros(len(uneven))
     for is_soft in (False, True):

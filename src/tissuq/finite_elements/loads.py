@@ -9,14 +9,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, Inflation, Mesh, RigidTip, Supports, felupe
 
 __all__ = ["Action", "Contact", "Load", "Pressure", "load_on"]
 
-FloatArray = NDArray[np.float64]
 
 MPA_OF_KPA = 1e-3
 STIFFNESS = 1000.0

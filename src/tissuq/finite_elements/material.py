@@ -8,8 +8,9 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.energy_derivatives import FibreEnergy, Fibres, gradient, gradient_and_hessian, is_arithmetic
 from tissuq.mechanics import FibreMaterial, Material
@@ -28,8 +29,6 @@ __all__ = [
     "volumetric_stress",
     "volumetric_tangent",
 ]
-
-FloatArray = NDArray[np.float64]
 
 
 class FElupeMaterial:

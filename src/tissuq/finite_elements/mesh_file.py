@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import CELL_KINDS, FloatArray
+from tissuq.finite_elements.case import CELL_KINDS
 
 __all__ = ["AXES", "NEARLY", "MeshFile", "deck_text", "read_mesh"]
 
@@ -31,8 +31,8 @@ class MeshFile(NamedTuple):
     """What a file holds: points (n, 2 or 3), mm, cells (c, k) of one kind, and sets of points by name."""
 
     points: FloatArray
-    cells: NDArray[np.intp]
-    sets: Mapping[str, NDArray[np.intp]]
+    cells: IndexArray
+    sets: Mapping[str, IndexArray]
 
 
 def read_mesh(path: Path) -> MeshFile:
@@ -133,7 +133,7 @@ def _is_in_space(points: FloatArray) -> bool:
     return bool(len(sizes) > 2 and sizes[2] > NEARLY * sizes.max())
 
 
-def _sets(mesh: Any) -> Iterator[tuple[str, NDArray[np.intp]]]:
+def _sets(mesh: Any) -> Iterator[tuple[str, IndexArray]]:
     """Yield the sets of points of a file, and the points of its named groups of cells."""
     for name, members in mesh.point_sets.items():
         yield name, np.asarray(members, dtype=np.intp)

@@ -9,8 +9,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.finite_elements.bodies import ClampedBar, Indentation
 from tissuq.finite_elements.case import Case
@@ -33,7 +34,6 @@ __all__ = [
     "solved",
 ]
 
-FloatArray = NDArray[np.float64]
 
 BULK_RATIO = 2000.0
 """Bulk modulus in initial shear moduli: the volume changes by a thousandth where the pressure is two shear moduli."""
@@ -157,7 +157,7 @@ def case_forces(
     values: ArrayLike | None,
     travel: ArrayLike,
     bulk_ratio: float = BULK_RATIO,
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """Return the forces (n,), N, at increasing depths or elongations (n,), mm.
 
     Raises
@@ -179,7 +179,7 @@ def case_forces(
 
 def indentation_force(
     material: str | Material, values: ArrayLike | None, depths: ArrayLike, **sizes: Any
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """Return the forces (n,), N, of a flat rigid punch at depths (n,), mm, in increasing order.
 
     Parameters
@@ -208,9 +208,7 @@ def indentation_force(
     return case_forces(Indentation(depth=float(travel[-1]), **sizes), material, values, travel)
 
 
-def bar_force(
-    material: str | Material, values: ArrayLike | None, elongations: ArrayLike, **sizes: Any
-) -> NDArray[np.float64]:
+def bar_force(material: str | Material, values: ArrayLike | None, elongations: ArrayLike, **sizes: Any) -> FloatArray:
     """Return the forces (n,), N, of a clamped bar at elongations (n,), mm, in increasing order.
 
     Parameters and exceptions are those of `indentation_force`, with the sizes of `ClampedBar`.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements.case import Case, Mesh
 from tissuq.finite_elements.first_order import FirstOrderError, controlled, draws_in_full, first_order_forces
@@ -34,7 +34,6 @@ __all__ = [
     "simulate",
 ]
 
-FloatArray = NDArray[np.float64]
 
 COMPLETE, MATERIAL_ONLY, WITHOUT, FINE_MESH = "complete", "alone", "without", "fine"
 """Draws with their discrepancy; the same draws without it; draws of a fit without discrepancy; one on a fine mesh."""
@@ -106,7 +105,7 @@ class Simulation:
     bulk_ratio: float = BULK_RATIO
 
     @property
-    def in_full(self) -> NDArray[np.bool_]:
+    def in_full(self) -> BoolArray:
         """Which draws (N,) were computed in full: the others follow to first order."""
         if COMPLETE not in self.first_order_error:
             return np.ones(len(self.forces[COMPLETE]), dtype=bool)

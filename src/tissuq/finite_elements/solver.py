@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.export.cards import NEARLY
 from tissuq.finite_elements.case import AXIAL, Case, felupe
@@ -18,7 +19,6 @@ from tissuq.mechanics import Material
 
 __all__ = ["CellFields", "Solver", "StrainPath", "check_bulk_ratio"]
 
-FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, FloatArray, FloatArray]
 
 MAX_HALVINGS = 6

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ __all__ = [
     "too_few_draws",
 ]
 
-FloatArray = NDArray[np.float64]
 
 PROBABILITY = 0.95
 MIN_DRAWS_A_COLUMN = 5

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.inference.nested import MAX_NESTED, nested_draws, nested_log_mass
 from tissuq.inference.quasi_monte_carlo import SHIFTS, quasi_random
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
 __all__ = ["NEGLIGIBLE_MASS", "TOUCHED_MASS", "Boxes", "lower_triangle"]
 
-FloatArray = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 NEGLIGIBLE_MASS = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
@@ -202,7 +200,7 @@ def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
     return np.asarray(ndtr(low) + ndtr(-high))
 
 
-def _by_pattern(active: NDArray[np.bool_], rows: NDArray[np.bool_]) -> Iterator[tuple[Places, Places]]:
+def _by_pattern(active: BoolArray, rows: BoolArray) -> Iterator[tuple[IndexArray, IndexArray]]:
     """Yield places of parameters whose bounds matter, and the rows among some of which this is true."""
     for pattern in np.unique(active[rows], axis=0) if rows.any() else ():
         yield np.flatnonzero(pattern), np.flatnonzero(rows & (active == pattern).all(axis=1))

@@ -8,13 +8,12 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 
 __all__ = ["MAX_RHAT", "Draws", "check_minima", "diagnostic"]
 
-Floats = NDArray[np.float64]
 
 MAX_RHAT = 1.01
 """Of any parameter, for draws that count as converged."""
@@ -37,25 +36,25 @@ class Draws(ABC):
     sample sizes).
     """
 
-    values: Floats
+    values: FloatArray
     names: tuple[str, ...]
 
     @cached_property
-    def rhat(self) -> Floats:
+    def rhat(self) -> FloatArray:
         """Rank-normalised split R-hat of each parameter, the larger of bulk and tail: (d,) array."""
         return diagnostic("rhat", self.values)
 
     @cached_property
-    def ess_bulk(self) -> Floats:
+    def ess_bulk(self) -> FloatArray:
         """Effective sample size for the centre of each marginal: (d,) array."""
         return self._limited(diagnostic("ess", self.values, method="bulk"))
 
     @cached_property
-    def ess_tail(self) -> Floats:
+    def ess_tail(self) -> FloatArray:
         """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
         return self._limited(diagnostic("ess", self.values, method="tail", prob=0.05))
 
-    def of(self, values: Floats, names: tuple[str, ...]) -> Self:
+    def of(self, values: FloatArray, names: tuple[str, ...]) -> Self:
         """Return the same run with other quantities (chains, draws, k) that follow from its draws."""
         return replace(self, values=values, names=names)
 
@@ -84,7 +83,7 @@ class Draws(ABC):
     def _failures(self) -> list[tuple[str, str]]:
         """Return what failed and its remedy; a diagnostic that is not a number fails."""
 
-    def _limited(self, sizes: Floats) -> Floats:
+    def _limited(self, sizes: FloatArray) -> FloatArray:
         """Return effective sample sizes, cut down where the sampler knows them to be too large."""
         return sizes
 
@@ -106,7 +105,7 @@ def check_minima(sampler: str, settings: object, **minima: int) -> None:
             raise InputError(f"{sampler} {name}: {getattr(settings, name)} is too few; use at least {minimum}.")
 
 
-def diagnostic(statistic: str, draws: Floats, **options: Any) -> Floats:
+def diagnostic(statistic: str, draws: FloatArray, **options: Any) -> FloatArray:
     """Return one of ArviZ's diagnostics, imported when first needed, of a (chains, draws, ...) array."""
     from arviz_stats.base import array_stats
 

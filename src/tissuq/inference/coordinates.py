@@ -16,9 +16,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import ndtr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 
 __all__ = [
@@ -34,7 +35,6 @@ __all__ = [
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
 LogDensity = Callable[[Any], Any]
-Floats = NDArray[np.float64]
 Derivatives = Callable[[Any], tuple[Any, Any, Any]]
 """Maps a point to the value, the gradient and the Hessian of a log density."""
 
@@ -79,8 +79,8 @@ class Box:
     [2.0, 25.0]
     """
 
-    lower: Floats
-    upper: Floats
+    lower: FloatArray
+    upper: FloatArray
 
     def __init__(self, lower: ArrayLike, upper: ArrayLike) -> None:
         object.__setattr__(self, "lower", np.atleast_1d(np.asarray(lower, dtype=np.float64)))
@@ -93,27 +93,27 @@ class Box:
             raise InputError(f"bounds {index}: {fault}; give lower < upper.")
 
     @property
-    def has_lower(self) -> NDArray[np.bool_]:
+    def has_lower(self) -> BoolArray:
         """Which coordinates have a lower bound."""
         return np.isfinite(self.lower)
 
     @property
-    def has_upper(self) -> NDArray[np.bool_]:
+    def has_upper(self) -> BoolArray:
         """Which coordinates have an upper bound."""
         return np.isfinite(self.upper)
 
     @property
-    def is_bounded(self) -> NDArray[np.bool_]:
+    def is_bounded(self) -> BoolArray:
         """Which coordinates have both bounds."""
         return self.has_lower & self.has_upper
 
     @property
-    def is_half_bounded(self) -> NDArray[np.bool_]:
+    def is_half_bounded(self) -> BoolArray:
         """Which coordinates have exactly one bound."""
         return self.has_lower ^ self.has_upper
 
     @property
-    def width(self) -> Floats:
+    def width(self) -> FloatArray:
         """The distance between the bounds, or one."""
         return np.where(self.is_bounded, self.upper - self.lower, 1.0)
 
@@ -130,7 +130,7 @@ class Box:
             raise InputError(f"the box has {self.lower.size} coordinates; {len(labels)} names were given.")
         return labels
 
-    def to_line(self, point: ArrayLike) -> Floats:
+    def to_line(self, point: ArrayLike) -> FloatArray:
         """Return the (d,) real-line coordinates of a (d,) point inside the box.
 
         Raises
@@ -189,8 +189,8 @@ class Mode:
         Log density at the mode plus log det L: the log of the mode's probability, up to a constant.
     """
 
-    location: Floats
-    scale: Floats
+    location: FloatArray
+    scale: FloatArray
     log_mass: float
 
     def whiten(self, line: Any) -> Any:
@@ -276,7 +276,7 @@ def _distinct(modes: list[Mode]) -> tuple[Mode, ...]:
     return tuple(distinct)
 
 
-def _climb(derivatives: Derivatives, line: Floats, max_steps: int = 500, tolerance: float = 1e-8) -> Mode:
+def _climb(derivatives: Derivatives, line: FloatArray, max_steps: int = 500, tolerance: float = 1e-8) -> Mode:
     """Climb to a local maximum by Newton steps, damped until they rise and repelled by saddle points.
 
     The search ends when the next undamped step promises less than the tolerance (a difference of log
@@ -302,7 +302,7 @@ def _climb(derivatives: Derivatives, line: Floats, max_steps: int = 500, toleran
     return Mode(line, scale, float(value + np.linalg.slogdet(scale)[1]))
 
 
-def _inverse_root(matrix: Floats) -> Floats:
+def _inverse_root(matrix: FloatArray) -> FloatArray:
     """Return L with L L^T the inverse of a symmetric matrix, negative curvatures counted as positive.
 
     Rows and columns are brought to unit diagonal first, so that very different scales cost no accuracy.
@@ -313,7 +313,7 @@ def _inverse_root(matrix: Floats) -> Floats:
     return np.asarray(axes / np.sqrt(np.maximum(np.abs(curvature), 1e-12)) / size[:, None])
 
 
-def _next_inside(bound: ArrayLike, towards: float) -> Floats:
+def _next_inside(bound: ArrayLike, towards: float) -> FloatArray:
     """Return the nearest number inside a bound that XLA does not flush to zero."""
     bound = np.asarray(bound, dtype=np.float64)
     tiny = np.copysign(np.finfo(float).tiny, towards)

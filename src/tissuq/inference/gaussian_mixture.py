@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.marginal import Marginal, marginal_of_mixture
 from tissuq.inference.quasi_monte_carlo import systematic
 
 __all__ = ["CHAINS", "GaussianMixture"]
 
-FloatArray = NDArray[np.float64]
 
 CHAINS, DRAWS = 4, 1000
 """Number of chains of draws from a mixture, and of draws in each chain."""
@@ -44,11 +44,11 @@ class GaussianMixture:
     settings: FloatArray
     mean: FloatArray
     root: FloatArray
-    member: NDArray[np.intp] | None = None
+    member: IndexArray | None = None
 
     @classmethod
     def of_points(
-        cls, weights: FloatArray, settings: FloatArray, values: FloatArray, member: NDArray[np.intp] | None = None
+        cls, weights: FloatArray, settings: FloatArray, values: FloatArray, member: IndexArray | None = None
     ) -> GaussianMixture:
         """Return points without extent: settings (M, d) and values (M, p) of the linear parameters."""
         count, p = values.shape
@@ -117,7 +117,7 @@ class GaussianMixture:
         sds = np.sqrt((self.root[:, index] ** 2).sum(axis=1))
         return marginal_of_mixture(self.weights, self.mean[:, index], sds)
 
-    def draw(self, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
+    def draw(self, seed: int) -> tuple[IndexArray, FloatArray]:
         """Return the component (chains, draws) of every draw, and its linear parameters (chains, draws, p)."""
         generator = np.random.default_rng(seed)
         component = generator.choice(len(self.weights), size=(CHAINS, DRAWS), p=self.weights)
@@ -154,7 +154,7 @@ class GaussianMixture:
         first_of_equals = self._first_of_equals()
         return self[first_of_equals].weighted(np.add.reduceat(self.weights, first_of_equals))
 
-    def _first_of_equals(self) -> NDArray[np.intp]:
+    def _first_of_equals(self) -> IndexArray:
         """Return the indices of the components that differ from their predecessor in more than the weight."""
         is_new = np.zeros(len(self), dtype=bool)
         is_new[0] = True

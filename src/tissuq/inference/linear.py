@@ -16,8 +16,8 @@ from math import log, pi
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.box import Boxes
 from tissuq.inference.reduction import Reducer, Reduction, Spectrum
@@ -35,8 +35,6 @@ __all__ = [
     "integrated",
     "times_gaussians",
 ]
-
-FloatArray = NDArray[np.float64]
 
 
 MAX_FEW_PARAMETERS = 4
@@ -264,7 +262,7 @@ class ConditionalGaussian:
                 "discrepancy. Give the noise, or narrower priors, or use the method 'nuts'."
             ) from error
 
-    def _moments(self, reduced: Reduction, group: NDArray[np.intp], h: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _moments(self, reduced: Reduction, group: IndexArray, h: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return D' V^-1 D for the data matrix D, and log |V|, for every setting; some settings at a time."""
         q, directions = len(self.model.column_symbols) + 1, reduced.counts.shape[1]
         moments, log_determinant = np.empty((*h.shape[:2], q * q)), np.empty(h.shape[:2])
@@ -286,7 +284,7 @@ class ConditionalGaussian:
         return moments.reshape(*h.shape[:2], q, q), log_determinant
 
 
-def _grouped(settings: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+def _grouped(settings: FloatArray) -> tuple[FloatArray, IndexArray]:
     """Return the distinct rows of settings (N, s), and for every row which of them it is."""
     if not settings.shape[1]:
         return settings[:1], np.zeros(len(settings), dtype=np.intp)

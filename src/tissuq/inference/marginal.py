@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from tissuq.arrays import FloatArray, IndexArray
 
 __all__ = [
     "HermiteCubics",
@@ -22,7 +24,6 @@ __all__ = [
     "widened",
 ]
 
-FloatArray = NDArray[np.float64]
 
 TABLE_POINTS = 1001
 """In a table that is smoothed from many values."""
@@ -238,7 +239,7 @@ class HermiteCubics:
         integral_to_interval = np.append(0.0, np.cumsum(sum(factor * width**power for power, factor in terms)))
         return np.asarray(integral_to_interval[index] + sum(factor[index] * step**power for power, factor in terms))
 
-    def _steps(self, arguments: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    def _steps(self, arguments: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Return the interval (g,) of each point, and how far in it the point lies."""
         index = np.searchsorted(self.points[1:-1], arguments, side="right")
         return index, arguments - self.points[index]

@@ -6,13 +6,12 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
 __all__ = ["MAX_NESTED", "nested_draws", "nested_log_density", "nested_log_mass", "nested_points"]
 
-FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
 MAX_NESTED = 3

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, Proposal, log_normal, systematic, tempered
 
 __all__ = ["Mixture", "fitted", "weighted_points"]
 
-FloatArray = NDArray[np.float64]
 Mixture = Sequence[tuple[float, Proposal]]
 """Proposals with their shares, which sum to one."""
 

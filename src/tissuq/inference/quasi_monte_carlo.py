@@ -9,7 +9,8 @@ from math import lgamma, log, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tissuq.arrays import FloatArray, IndexArray
 
 __all__ = [
     "LOG_OF_NOTHING",
@@ -27,7 +28,6 @@ __all__ = [
     "tempered",
 ]
 
-FloatArray = NDArray[np.float64]
 
 SHIFTS = 8
 """Shifted copies of the quasi-random points, whose spread tells the error (more, where few points count)."""
@@ -75,7 +75,7 @@ def _steps(dimension: int) -> FloatArray:
     return np.asarray(ratio ** -np.arange(1.0, dimension + 1))
 
 
-def systematic(weights: FloatArray, count: int, offset: float | FloatArray = 0.5) -> NDArray[np.intp]:
+def systematic(weights: FloatArray, count: int, offset: float | FloatArray = 0.5) -> IndexArray:
     """Return which points to take, each as often as its weight says, in ascending order: neighbours stay neighbours.
 
     Parameters
@@ -97,7 +97,7 @@ def systematic(weights: FloatArray, count: int, offset: float | FloatArray = 0.5
     return np.asarray(np.minimum(indices, edges.shape[1] - 1), dtype=np.intp)
 
 
-def resampled_at_random(log_weights: FloatArray, generator: np.random.Generator) -> NDArray[np.intp]:
+def resampled_at_random(log_weights: FloatArray, generator: np.random.Generator) -> IndexArray:
     """Return as many draws of R sets as these have, (R, n), from log weights (R, n) up to a constant for each set."""
     weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
     return systematic(weights, weights.shape[1], generator.random((len(weights), 1)))

@@ -8,8 +8,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import States
 from tissuq.inference.threads import one_thread
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
@@ -27,7 +27,6 @@ __all__ = [
     "scaled_spectrum",
 ]
 
-FloatArray = NDArray[np.float64]
 
 TRUNCATED_VARIANCE_SHARE = 1e-14
 """Share of the process's variance at all points that the factor of many may leave out."""

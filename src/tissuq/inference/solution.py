@@ -8,8 +8,8 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, widened
 from tissuq.model.discrepancy import side_by_side
@@ -28,7 +28,6 @@ __all__ = [
     "shares_of_members",
 ]
 
-FloatArray = NDArray[np.float64]
 
 NO_ERROR: Mapping[str, float] = {}
 PROBABLE_DIRECTION = 0.5
@@ -182,7 +181,7 @@ class Solution:
         return {symbol: named[symbol] for symbol in self.model.symbols}
 
     @property
-    def component_of_draw(self) -> NDArray[np.intp]:
+    def component_of_draw(self) -> IndexArray:
         """The index of every draw's component of `mixture` (chains, draws)."""
         return self._drawn[0]
 
@@ -205,7 +204,7 @@ class Solution:
         return values
 
     @cached_property
-    def _drawn(self) -> tuple[NDArray[np.intp], FloatArray]:
+    def _drawn(self) -> tuple[IndexArray, FloatArray]:
         """The component of every draw, and its linear parameters and weights."""
         if self.sampled is None:
             return self.mixture.draw(self.seed)
@@ -237,7 +236,7 @@ class Solution:
         return chains, draws
 
 
-def are_isotropic(model: StatisticalModel, mixture: GaussianMixture) -> NDArray[np.bool_]:
+def are_isotropic(model: StatisticalModel, mixture: GaussianMixture) -> BoolArray:
     """Return which components (M,) of a posterior have no preferred direction."""
     if mixture.member is None:
         return np.ones(len(mixture.weights), dtype=bool)
@@ -268,7 +267,7 @@ def _same(mixture: GaussianMixture) -> GaussianMixture:
     return mixture
 
 
-def shares_of_members(model: StatisticalModel, members: NDArray[np.intp], weights: FloatArray) -> dict[str, float]:
+def shares_of_members(model: StatisticalModel, members: IndexArray, weights: FloatArray) -> dict[str, float]:
     """Return the probability of every sum of blocks, its length scales together, for weighted members (M,)."""
     share_of_name: dict[str, float] = {}
     shares = np.bincount(members, weights, minlength=len(model.energy_members))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -28,7 +28,6 @@ from tissuq.parameters.normal_interval import log_interval
 
 __all__ = ["TruncatedMixture", "checked_masses"]
 
-FloatArray = NDArray[np.float64]
 
 MIN_DRAWS = 4000
 """Draws, at least, that represent what bounds cut, in predictions and a posterior's draws, unless fewer are wanted."""
@@ -65,7 +64,7 @@ class TruncatedMixture:
     """
 
     gaussians: GaussianMixture
-    touched: NDArray[np.bool_]
+    touched: BoolArray
     box: Boxes
 
     @classmethod

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.experiments.modes.path import STEP
 from tissuq.mechanics.arithmetic import exp, library, log
 from tissuq.mechanics.material import Material
@@ -23,7 +23,6 @@ __all__ = [
     "sum_of_energies",
 ]
 
-FloatArray = NDArray[np.float64]
 
 SHARES, WEIGHTS = 0.5 * (np.polynomial.legendre.leggauss(8) + np.array([[1.0], [0.0]]))
 """Nodes and weights of the integral over s, from 0 to 1."""
@@ -117,7 +116,7 @@ class Continuation(NamedTuple):
         outside = tuple(arrays.where(is_beyond, stretch, any_stretch) for stretch, any_stretch in pairs)
         return arrays.where(is_beyond, self._beyond(*_invariant_and_direction(outside)), energy(inside))
 
-    def stress(self, logs: FloatArray, rates: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    def stress(self, logs: FloatArray, rates: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Return which states (n, 3) lie beyond, and their stresses, which are the work on the rates (n, 3)."""
         invariant, direction = _invariant_and_direction(np.exp(logs).T)
         (outside,) = np.nonzero(invariant > np.exp(self._functions(direction)[0]))

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.modes import LoadingMode, States
 
 __all__ = ["MeasuredStates", "farthest_stretch", "invariant_rates", "invariants", "largest_invariants"]
 
-FloatArray = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 LARGEST_STRETCH = 10.0
 """Stretch, or one over it, beyond which no range is followed."""
@@ -68,7 +66,7 @@ class MeasuredStates:
         strains = tuple((factor**0.5 * low, factor**0.5 * high) for low, high in self.strains)
         return MeasuredStates(factor * self.I1, factor * self.I2, strains)
 
-    def contain(self, states: States, rounding: float = ROUNDING) -> Flags:
+    def contain(self, states: States, rounding: float = ROUNDING) -> BoolArray:
         """Return which states (n,) are among them, where invariants may be larger by such a share."""
         reached_I1, reached_I2 = invariants(states)
         inside = (reached_I1 <= self.I1 * (1 + rounding)) & (reached_I2 <= self.I2 * (1 + rounding))

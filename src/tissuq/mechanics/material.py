@@ -10,8 +10,8 @@ from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import Deformation
 from tissuq.parameters.parameter import Parameter
@@ -56,11 +56,11 @@ class Material(ABC):
         return MaterialSum.of(self, material)
 
     @property
-    def linear_mask(self) -> NDArray[np.bool_]:
+    def linear_mask(self) -> BoolArray:
         """To which of its parameters (k,) the stress is proportional."""
         return np.array([parameter.is_linear for parameter in self.parameters], dtype=bool)
 
-    def unit_values(self, nonlinear: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unit_values(self, nonlinear: FloatArray) -> FloatArray:
         """Return values (m, p, k) in which each of p linear parameters is one by itself, at m others' values (m, s)."""
         is_linear = self.linear_mask
         values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(nonlinear), axis=0)

@@ -13,8 +13,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.experiments.modes import Deformation, Path, States
 from tissuq.mechanics.arithmetic import cos, exp, sin
 
@@ -36,7 +36,6 @@ __all__ = [
     "with_errors",
 ]
 
-FloatArray = NDArray[np.float64]
 
 DIRECTIONS = np.linspace(-1, 1, 801)
 """Of rays: c = 3 sqrt(6) e1 e2 e3 / |e|^3; 1 in uniaxial tension, 0 in planar, -1 in equibiaxial tension."""
@@ -247,7 +246,7 @@ class Rays:
     tilt: FloatArray | float = 0.0
 
     @classmethod
-    def leaving(cls, states: States, limits: Range) -> tuple[NDArray[np.intp], Rays, States]:
+    def leaving(cls, states: States, limits: Range) -> tuple[IndexArray, Rays, States]:
         """Return which states (g,) lie beyond a range, the rays to these, and all states drawn back to the range."""
         (logs, _), (tilt, _) = states.log_stretches, states.tilt
         share = share_to_end(logs, limits, tilt)

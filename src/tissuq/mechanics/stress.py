@@ -8,8 +8,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode, Path, SimpleShear, States
 from tissuq.experiments.modes.path import STEP, UNMEASURED, Deformation
@@ -28,7 +29,6 @@ __all__ = [
     "traced_stress_basis",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 """Number of stresses from which compiling their derivatives takes less time, and of those that are computed at once."""
@@ -47,7 +47,7 @@ def path_energy(material: Material, path: Path, point: Any, values: Any, step: A
 
 def engineering_stress(
     material: Material, mode: LoadingMode | Path, stretch: ArrayLike, values: ArrayLike
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """Return the engineering stress, (1 / loaded axes) dW/dstretch.
 
     Parameters

@@ -17,8 +17,8 @@ from traceback import extract_tb
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import Path as StressPath
 from tissuq.experiments.modes import loading_modes
@@ -45,7 +45,6 @@ __all__ = [
     "values_within_reach",
 ]
 
-FloatArray = NDArray[np.float64]
 
 LAW = re.compile(r"(?P<path>.+\.py):(?P<name>\w+)")
 """The file and the name in it."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
@@ -19,7 +19,6 @@ from tissuq.model.tolerances import Tolerances
 
 __all__ = ["check_angles", "check_linearity", "check_parts", "check_separable"]
 
-FloatArray = NDArray[np.float64]
 
 ANGLES = (0.0, np.pi / 2)
 """Between which angles of fibres lie."""

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.model.discrepancy import Discrepancy
@@ -19,7 +19,6 @@ from tissuq.model.tolerances import FittedErrors, Tolerances, specimens_of
 
 __all__ = ["ErrorModel", "Whitening", "whitening", "widening_of_lag"]
 
-FloatArray = NDArray[np.float64]
 
 NEGLIGIBLE_SPREAD, ROUNDING = 1e-9, 1e-14
 """Variance of a shared error over that of the noise, and over the largest one, below which it is left out."""
@@ -147,7 +146,7 @@ def whitening(
     return Whitening(size, lags, along, spread[is_significant])
 
 
-def _errors_of_tests(specimens: NDArray[np.bool_], tolerances: Tolerances, tests: Sequence[ErrorPoints]) -> FloatArray:
+def _errors_of_tests(specimens: BoolArray, tolerances: Tolerances, tests: Sequence[ErrorPoints]) -> FloatArray:
     """Return what errors of whole tests do to all measurements (n, q), at the points of these.
 
     Of some errors only the differences of specimens or tests from their mean. Where tests have different numbers of

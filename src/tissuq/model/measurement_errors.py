@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import LoadingMode
 from tissuq.registry import plugins, variants
 
@@ -22,7 +22,6 @@ __all__ = [
     "measurement_errors",
 ]
 
-FloatArray = NDArray[np.float64]
 
 Shared = Literal["specimens' differences", "tests' differences", "specimen", "test"]
 

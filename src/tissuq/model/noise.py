@@ -10,8 +10,8 @@ from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import stress_in_mpa
 from tissuq.experiments.experiment import Experiment
@@ -33,7 +33,6 @@ __all__ = [
     "stress_level",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MIN_SD_MPA, MAX_SD_MPA = 1e-150, 1e150
 """Known standard deviations whose squares can be computed lie between these."""

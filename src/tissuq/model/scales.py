@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics.invariants import invariant_rates, largest_invariants
@@ -16,7 +16,6 @@ from tissuq.parameters.priors import Prior, Uniform
 
 __all__ = ["MAX_SCORE", "at_scores", "default_boxes", "default_prior", "off_zero", "support"]
 
-FloatArray = NDArray[np.float64]
 
 MAX_SCORE = 8.0
 """Standard deviations beyond which probabilities round to one."""

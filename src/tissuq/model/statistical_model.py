@@ -8,8 +8,9 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
@@ -29,7 +30,6 @@ from tissuq.parameters.priors import Flat, Prior
 
 __all__ = ["StatisticalModel"]
 
-FloatArray = NDArray[np.float64]
 
 BENT_QUANTILES = (0.001, 0.1, 0.5, 0.9, 0.999)
 """Probabilities of the exponents' priors at which the size of a box is judged."""
@@ -258,7 +258,7 @@ class StatisticalModel(ErrorModel):
         rows = np.asarray(self.rows(bases.swapaxes(0, 1).reshape(bases.shape[1], -1)))
         return rows.reshape(len(rows), len(bases), -1).swapaxes(0, 1)
 
-    def by_limits(self, member: NDArray[np.intp]) -> Iterator[tuple[Range, NDArray[np.intp]]]:
+    def by_limits(self, member: IndexArray) -> Iterator[tuple[Range, IndexArray]]:
         """Yield the different ranges of the data of energy members (M,), and which of these have each.
 
         Nothing for a material with fibres, whose energy does not follow from the principal stretches.

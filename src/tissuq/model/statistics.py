@@ -11,11 +11,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
-from numpy.typing import NDArray
+
+from tissuq.arrays import FloatArray, IndexArray
 
 __all__ = ["CHUNK", "Condensed", "Statistics", "condensed", "is_condensed", "upper_triangle"]
 
-FloatArray = NDArray[np.float64]
 
 CHUNK = 16_384
 """Measurements taken in at once: what bounds the memory."""
@@ -113,7 +113,7 @@ class Condensed:
     """
 
     edges: FloatArray
-    piece: NDArray[np.intp]
+    piece: IndexArray
     triangle: FloatArray
     stretch: FloatArray
 

@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.model.measurement_errors import (
@@ -38,7 +38,6 @@ __all__ = [
     "specimens_of",
 ]
 
-FloatArray = NDArray[np.float64]
 
 CONTRADICTION_SPREAD = 0.3
 """Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
@@ -324,7 +323,7 @@ BETWEEN_SPECIMENS = Tolerances(stress=ESTIMANDS[TISSUE].sizes["stress"])
 """For tests of different specimens, where the discrepancy takes up other errors: their stresses agree to 18 %."""
 
 
-def specimens_of(experiment: Experiment) -> NDArray[np.bool_]:
+def specimens_of(experiment: Experiment) -> BoolArray:
     """Return which tests (tests, specimens) are of which specimen; a test without a name is of one of its own."""
     labels = [test.specimen or number for number, test in enumerate(experiment.tests)]
     return np.array([[label == specimen for specimen in dict.fromkeys(labels)] for label in labels])

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.modulus import modulus_moments
 from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import check_no_percent, checked_points
@@ -37,7 +38,6 @@ __all__ = [
     "target_named",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MIN_POINTS, MAX_POINTS = 10, 40
 """Smallest and largest number of measurements of a default candidate, which otherwise has as many as the data."""

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.mechanics.rays import Range, Rays, log_growth, with_errors
@@ -30,8 +30,6 @@ from tissuq.prediction.moments import (
 )
 
 __all__ = ["Variances", "expected_variances", "joint_stresses", "states_of"]
-
-FloatArray = NDArray[np.float64]
 
 
 def states_of(model: StatisticalModel, stresses: Sequence[tuple[LoadingMode, FloatArray]]) -> States:

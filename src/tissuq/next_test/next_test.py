@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
@@ -24,7 +24,6 @@ from tissuq.prediction.moments import stress_moments, stress_slopes, values_by_s
 
 __all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]
 
-FloatArray = NDArray[np.float64]
 Column = tuple[FloatArray, FloatArray]
 
 Specimen = Literal["same", "other"]

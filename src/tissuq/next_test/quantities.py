@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -16,7 +16,6 @@ from tissuq.next_test.candidates import Stresses, Target
 
 __all__ = ["QuantityTarget", "quantity_target"]
 
-FloatArray = NDArray[np.float64]
 States = Sequence[tuple[LoadingMode, FloatArray]]
 
 MIN_DRAWS = 8

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tissuq.arrays import BoolArray, FloatArray
 
 __all__ = ["interval_quantile", "log_interval"]
 
-FloatArray = NDArray[np.float64]
 
 ALMOST_NOTHING, ALMOST_ALL = -20.0, 8.5
 """Scores below which the quick Phi soon underflows, and from which it is one in double precision."""
@@ -33,7 +33,7 @@ def interval_quantile(probability: Any, low: Any, high: Any) -> tuple[FloatArray
     return np.asarray(np.clip(np.where(is_mirrored, -value, value), low, high)), log_mass
 
 
-def _mirrored(low: Any, high: Any) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+def _mirrored(low: Any, high: Any) -> tuple[BoolArray, FloatArray, FloatArray]:
     """Return whether the interval is taken on the other side of zero, and log Phi at its ends there."""
     is_mirrored = np.asarray(low) > 0
     start, end = np.where(is_mirrored, -np.asarray(high), low), np.where(is_mirrored, -np.asarray(low), high)

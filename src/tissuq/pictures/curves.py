@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.quasi_monte_carlo import systematic
@@ -31,7 +31,6 @@ __all__ = [
     "ways_of",
 ]
 
-FloatArray = NDArray[np.float64]
 
 POINTS, SHARE_POINTS, SHARE_DRAWS = 101, 41, 800
 """Points of a band and of a share along a curve, and draws of the latter."""
@@ -49,7 +48,7 @@ NO_STRESS = 0.02
 class Way(NamedTuple):
     """Indices of points in the order of what they are drawn against, and whether as a curve or by themselves."""
 
-    indices: NDArray[np.intp]
+    indices: IndexArray
     is_curve: bool
 
 
@@ -70,7 +69,7 @@ class Described:
     solution: Solution
     curve: Curve
     prob: float = 0.95
-    known_inside: NDArray[np.bool_] | None = None
+    known_inside: BoolArray | None = None
 
     @cached_property
     def points(self) -> FloatArray:
@@ -113,7 +112,7 @@ class Described:
         return ways_of(self.curve.mode, self.points, self.abscissa)
 
     @cached_property
-    def measured_rows(self) -> list[NDArray[np.intp]]:
+    def measured_rows(self) -> list[IndexArray]:
         """The measurements of each of `ways`."""
         if held := rows_where_held(self.curve.mode, self.curve.points):
             return held
@@ -122,7 +121,7 @@ class Described:
         return [way.indices for way in self.ways]
 
     @cached_property
-    def inside(self) -> NDArray[np.bool_]:
+    def inside(self) -> BoolArray:
         """Which measurements are inside the band of new ones, with the discrepancy."""
         if self.known_inside is not None:
             return self.known_inside
@@ -142,7 +141,7 @@ class Described:
 
 
 def described(
-    solution: Solution, prob: float = 0.95, inside: Sequence[NDArray[np.bool_] | None] | None = None
+    solution: Solution, prob: float = 0.95, inside: Sequence[BoolArray | None] | None = None
 ) -> list[Described]:
     """Return what a posterior says of every measured curve, of which it may be known what is inside its band."""
     curves = solution.model.experiment.curves
@@ -184,7 +183,7 @@ def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list
     return ways
 
 
-def rows_where_held(mode: LoadingMode, points: FloatArray) -> list[NDArray[np.intp]]:
+def rows_where_held(mode: LoadingMode, points: FloatArray) -> list[IndexArray]:
     """Return the rows at each value of the second control of a mode with one stress, along the first one.
 
     Nothing of other modes, and where it is held at no few values.

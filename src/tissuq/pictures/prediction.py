@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.stability import calibrated_range, is_calibrated, measured_range
 from tissuq.drawing.panels import Panels, limits_of, within
 from tissuq.drawing.pieces import band, cut_off, line, outside, points
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Measured", "Predicted", "curves", "draw_predicted", "predicted_limits", "prediction", "predictions"]
 
-FloatArray = NDArray[np.float64]
 
 POINTS = 121
 """Of a band, unless they are given."""
@@ -46,7 +46,7 @@ class Measured:
 
     abscissa: FloatArray
     stress: FloatArray
-    is_calibrated: NDArray[np.bool_]
+    is_calibrated: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Predicted:
     abscissa: FloatArray
     stress: Band
     measurements: Band
-    is_calibrated: NDArray[np.bool_]
+    is_calibrated: BoolArray
     calibrated: tuple[float, float] | None
     ways: list[Way]
     measured: Measured | None
@@ -178,7 +178,7 @@ def predicted_limits(predicted: Sequence[Predicted]) -> tuple[float, float]:
     return limits_of([*core, *medians, *near], [])
 
 
-def _known(predicted: Predicted) -> NDArray[np.bool_]:
+def _known(predicted: Predicted) -> BoolArray:
     """Return where a prediction is calibrated, or everywhere where it is nowhere."""
     return predicted.is_calibrated if predicted.is_calibrated.any() else np.ones_like(predicted.is_calibrated)
 

@@ -11,14 +11,13 @@ from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import number_in
 
 __all__ = ["Covariate", "Covariates", "LevelCovariate", "NumberCovariate", "Place", "covariates_of"]
 
-FloatArray = NDArray[np.float64]
 Place: TypeAlias = Callable[[str, str], str]
 """Where the value of a specimen (or of none: an empty text) and of a covariate (likewise) stands, for messages."""
 

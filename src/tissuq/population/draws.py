@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.population.covariates import Covariates, covariates_of
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ALL_COVARIATES", "INTERVAL_COLUMNS", "PopulationDraws", "effect_table", "interval", "labelled_arrays"]
 
-FloatArray = NDArray[np.float64]
 
 INTERVAL_COLUMNS = ["median", "hdi_low", "hdi_high"]
 """What `interval` returns, as tables of a population have it."""

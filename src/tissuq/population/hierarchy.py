@@ -23,8 +23,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nuts
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
@@ -33,7 +33,6 @@ from tissuq.population.likelihoods import likelihoods_of
 
 __all__ = ["Hierarchy", "sample_hierarchy"]
 
-FloatArray = NDArray[np.float64]
 NO_COLUMNS: FloatArray = np.zeros(0)
 
 MEAN_PRIOR_SD = 5.0

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import quasi_random
 from tissuq.inference.solution import Solution
@@ -25,7 +25,6 @@ from tissuq.prediction.moments import values_of
 
 __all__ = ["Coordinates", "Likelihoods", "coordinates_of", "likelihoods_of", "mixtures_of", "on_line", "reduced"]
 
-FloatArray = NDArray[np.float64]
 
 MAX_STEPS = 30
 EDGE_SD = 3.3
@@ -82,7 +81,7 @@ def reduced(mixture: GaussianMixture, count: int) -> GaussianMixture:
 
 def _initial_clusters(
     whitened_means: FloatArray, whitened_covariances: FloatArray, weights: FloatArray, count: int
-) -> NDArray[np.intp]:
+) -> IndexArray:
     """Return first clusters: by size and distance from the middle, on either side of it, finer towards the ends."""
     from scipy.special import ndtr
 
@@ -272,9 +271,6 @@ def _under(
     return GaussianMixture.of_covariances(
         weights / weights.sum(), mixture.mean + np.einsum("mij,mj->mi", shrunk, pull), shrunk
     )
-
-
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.stability import calibrated_range
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["check_one_control", "matching_draws", "patient_band", "patient_curves", "patient_posterior"]
 
-FloatArray = NDArray[np.float64]
 
 STRETCH_STEP = 1e-3
 """Step of the stretch for the initial slope."""

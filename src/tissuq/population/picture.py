@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.drawing.panels import Panels, limits_of
 from tissuq.drawing.pieces import forest
 from tissuq.drawing.style import BAND, BASE, INK, TRUTH, relative_size
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_specimens", "height_of", "numbers_of"]
 
-FloatArray = NDArray[np.float64]
 
 ALONE = "#b8b8b8"
 ENDS = ("hdi_low", "hdi_high")

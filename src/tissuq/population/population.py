@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tissuq.drawing.panels import Panels, panels
 from tissuq.experiments.checked_arrays import headed, in_unit
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from tissuq.inference.enumerators.nuts import NutsDraws
 
 __all__ = ["Population"]
-
-FloatArray = NDArray[np.float64]
 
 
 class Population(PopulationDraws):

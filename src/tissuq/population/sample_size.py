@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.parameters.checks import check_probability
 from tissuq.population.draws import PopulationDraws
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_SPECIMENS", "needed_table", "relative_width", "score"]
 
-FloatArray = NDArray[np.float64]
 
 FUTURES = 200
 """Draws of the population from which the measurement goes on."""
@@ -90,7 +89,7 @@ def needed_table(population: PopulationDraws, aim: float, prob: float, assurance
     return pd.DataFrame(list(rows.values()), index, ["now", "floor", "specimens", "more"])
 
 
-def _sizes(count: int) -> NDArray[np.intp]:
+def _sizes(count: int) -> IndexArray:
     """Return numbers of specimens from those that there are to `MAX_SPECIMENS`."""
     steps = int(np.ceil(np.log(max(MAX_SPECIMENS / count, 1)) / np.log(GROWTH)))
     sizes = np.ceil(count * GROWTH ** np.arange(steps + 1)).astype(int)
@@ -98,7 +97,7 @@ def _sizes(count: int) -> NDArray[np.intp]:
 
 
 def _half_widths(
-    population: PopulationDraws, j: int, specimens: _Specimens, sizes: NDArray[np.intp], prob: float
+    population: PopulationDraws, j: int, specimens: _Specimens, sizes: IndexArray, prob: float
 ) -> FloatArray:
     """Return half the widths (2, futures, sizes) of the intervals of the median and of a new patient, on the line."""
     generator = np.random.default_rng([population.seed, 6, j])

@@ -16,8 +16,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import NoDiscrepancy
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
 __all__ = ["biased", "shared_covariance", "width_table"]
 
-FloatArray = NDArray[np.float64]
 
 COMPONENTS, BENT_COMPONENTS = 200, 32
 """Components of a posterior over which covariances given the discrepancy are averaged; of a law with exponents."""

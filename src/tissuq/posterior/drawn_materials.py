@@ -8,8 +8,8 @@ from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.assessment.stability import calibrated_range, stability_modes, stable_draws
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, States
@@ -26,7 +26,6 @@ from tissuq.prediction.moments import values_of
 
 __all__ = ["Sampling", "drawn_ensemble"]
 
-FloatArray = NDArray[np.float64]
 
 Sampling = Literal["sobol", "latin", "random"]
 """How draws spread: a scrambled Sobol sequence, Latin hypercubes, or independently."""
@@ -86,7 +85,7 @@ def drawn_ensemble(
     return Ensemble(numbered, model, admissible_in, tried, ranges, "" if solution.is_of_data else solution.reason)
 
 
-def _curves(draws: Sequence[EnergyDraw], indices: NDArray[np.intp]) -> Callable[[States], FloatArray]:
+def _curves(draws: Sequence[EnergyDraw], indices: IndexArray) -> Callable[[States], FloatArray]:
     """Return the function that gives the stresses of some of the draws."""
     return partial(stress_of, [draws[index] for index in indices])
 
@@ -203,7 +202,7 @@ def _knots(low: float, high: float) -> FloatArray:
 
 
 def _continued(
-    model: StatisticalModel, draws: Sequence[EnergyDraw], member: NDArray[np.intp], score: FloatArray
+    model: StatisticalModel, draws: Sequence[EnergyDraw], member: IndexArray, score: FloatArray
 ) -> list[EnergyDraw]:
     """Return draws with their continuations, of exponents whose errors have a score (N,)."""
     continued = list(draws)

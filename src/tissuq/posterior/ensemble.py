@@ -12,8 +12,9 @@ from html import escape
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.stability import measured_range
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
@@ -31,7 +32,6 @@ from tissuq.pictures.prediction import curves
 
 __all__ = ["EnergyDraw", "Ensemble", "stress_of", "stress_within"]
 
-FloatArray = NDArray[np.float64]
 
 PLOT_POINTS = 81
 """Stretches of a picture."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment import known_evidence_changes
 from tissuq.assessment.modulus import derived_marginal, modulus
 from tissuq.errors import InputError
@@ -156,7 +156,7 @@ def _numbers(solution: Solution, symbol: str, prob: float) -> dict[str, float]:
     return numbers | {"ess": ess, "rhat": diagnostics.rhat[symbol]}
 
 
-def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:
+def _draws(solution: Solution, seed: int) -> dict[str, FloatArray]:
     """Return the draws of every parameter, those of stresses with the error that all tests have in common."""
     model, drawn = solution.model, dict(solution.draws)
     if model.common_error:

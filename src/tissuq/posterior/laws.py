@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tissuq.assessment.evidence import warnings_of_evidence
 from tissuq.assessment.shares import shares_of_discrepancy
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ALL_LAWS", "LawComparison", "LawFit", "fit_laws", "laws_named"]
 
-FloatArray = NDArray[np.float64]
 
 ALL_LAWS = "all"
 """In place of names: every law that is the same in all directions."""

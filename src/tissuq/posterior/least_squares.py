@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
@@ -18,7 +18,6 @@ from tissuq.parameters.priors import Prior
 
 __all__ = ["LeastSquares", "least_squares"]
 
-FloatArray = NDArray[np.float64]
 
 STARTS_PER_PARAMETER, REFINED = 64, 8
 """Values of each nonlinear parameter from which the search starts, and how many of the best go on."""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stable_ranges
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
@@ -24,7 +24,6 @@ from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
 __all__ = ["ErrorEstimates", "default_tolerances", "with_standard_errors"]
 
-FloatArray = NDArray[np.float64]
 
 FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Factors of the spreads between specimens and tests that are tried."""

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray
 from tissuq.assessment import Assessment, assess, measurement_warnings
 from tissuq.assessment.answer import Answer, answer_of
 from tissuq.assessment.comparison import scores_of
@@ -450,7 +451,7 @@ class Posterior(PosteriorPlots):
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""
         return float(np.mean(np.concatenate(self.inside_bands(discrepancy=discrepancy, prob=prob))))
 
-    def inside_bands(self, *, discrepancy: bool = True, prob: float = 0.95) -> tuple[NDArray[np.bool_], ...]:
+    def inside_bands(self, *, discrepancy: bool = True, prob: float = 0.95) -> tuple[BoolArray, ...]:
         """Return which measurements are inside their predictive band, an array for every curve of the experiment."""
         key = (discrepancy, prob)
         if key not in self._inside:
@@ -460,7 +461,7 @@ class Posterior(PosteriorPlots):
         return self._inside[key]
 
     @property
-    def _is_inside(self) -> NDArray[np.bool_]:
+    def _is_inside(self) -> BoolArray:
         """Which measurements are inside their predictive band; none of a posterior of somebody who was not measured."""
         return np.concatenate(self.inside_bands()) if self.solution.is_of_data else np.ones(0, dtype=np.bool_)
 
@@ -478,7 +479,7 @@ class Posterior(PosteriorPlots):
         return leave_one_out(self.solution)
 
     @cached_property
-    def _inside(self) -> dict[tuple[bool, float], tuple[NDArray[np.bool_], ...]]:
+    def _inside(self) -> dict[tuple[bool, float], tuple[BoolArray, ...]]:
         return {}
 
     @cached_property

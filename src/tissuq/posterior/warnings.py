@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from math import ceil, isfinite, log
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import bdtr
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.measurements import falls, labels_of_tests
 from tissuq.assessment.modulus import modulus, modulus_symbols
@@ -59,9 +59,7 @@ MAX_PROBABILITY_OF_MISSES = 1e-3
 """Probability that so few measurements are inside their 95 % bands, were these right, below which they are not."""
 
 
-def warnings_about(
-    solution: Solution, ranges: Mapping[str, StableRange], inside: NDArray[np.bool_]
-) -> Iterator[ResultWarning]:
+def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside: BoolArray) -> Iterator[ResultWarning]:
     """Yield the warnings that a posterior carries.
 
     Parameters
@@ -278,7 +276,7 @@ def _noise_is_inseparable(solution: Solution) -> bool:
     return bool(low < MIN_VARIANCE_SHARE and high > 1 - MIN_VARIANCE_SHARE)
 
 
-def _mean_curve(solution: Solution) -> NDArray[np.float64]:
+def _mean_curve(solution: Solution) -> FloatArray:
     """Return the mean stress (n,) at the measurements, from so few components that memory suffices."""
     count = int(np.clip(MAX_ARRAY_VALUES // len(solution.model.states), 1, MAX_COMPONENTS))
     return mean_curve(solution, thinned=count)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.curve import Curve
@@ -40,7 +41,6 @@ __all__ = [
     "stress_ratio",
 ]
 
-FloatArray = NDArray[np.float64]
 
 STRESS_TYPES = ("engineering", "cauchy")
 """What stresses are predicted as."""
@@ -332,7 +332,7 @@ def stress_ratio(stress_type: str, mode: str | LoadingMode, channel: int) -> Cal
     return loading_mode(mode).paths[channel].cauchy_ratio
 
 
-def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: float = 0.95) -> NDArray[np.bool_]:
+def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: float = 0.95) -> BoolArray:
     """Return which measurements (n,) of a curve are inside the predictive band at their own stretches.
 
     The ends of the band at condensed measurements are interpolated between the points of these.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import log, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.inference.enumerators.noise_grid import NoiseGrid, shares_with_factors
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import integrated
@@ -37,7 +37,6 @@ __all__ = [
     "stride",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MAX_VALUES_AT_ONCE, MAX_VALUES_CONDENSED = 40_000_000, 4_000_000
 """Values at most in an array over draws and measurements (320 MB), and where the measurements are condensed."""
@@ -109,7 +108,7 @@ def _pointwise(model: StatisticalModel, mean: FloatArray, settings: FloatArray, 
     return np.asarray(-0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi)))
 
 
-def _at_noise(model: StatisticalModel, settings: FloatArray) -> Iterator[tuple[StatisticalModel, NDArray[np.intp]]]:
+def _at_noise(model: StatisticalModel, settings: FloatArray) -> Iterator[tuple[StatisticalModel, IndexArray]]:
     """Yield a model for every value of the noise, and at which settings (M, d) of the nonlinear parameters that is.
 
     It matters beside errors of whole tests, whose sizes do not grow with the noise. Where the noise was sampled, or
@@ -170,7 +169,7 @@ class LeaveOneOut:
     """Log densities (n,) of each stress given all the others, and whether each is rough: known by few components."""
 
     log_density: FloatArray
-    is_rough: NDArray[np.bool_]
+    is_rough: BoolArray
 
 
 def leave_one_out(solution: Solution) -> LeaveOneOut:
@@ -211,7 +210,7 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
 
 def _over_noise(
     model: StatisticalModel, wide: GaussianMixture, components: GaussianMixture, log_weights: FloatArray
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, BoolArray]:
     """Return log weights (M, n) with those at each value of the noise as its density says, and what is unsure (n,).
 
     A measurement that is left out moves the noise, and its inverse density changes much from one value to the next.
@@ -323,9 +322,7 @@ def joint_log_likelihood(solution: Solution) -> FloatArray:
     return density.reshape(component_index.shape)
 
 
-def _joint(
-    model: StatisticalModel, columns: FloatArray, settings: FloatArray, member: NDArray[np.intp] | None
-) -> FloatArray:
+def _joint(model: StatisticalModel, columns: FloatArray, settings: FloatArray, member: IndexArray | None) -> FloatArray:
     mean = mean_stress(model, columns, settings)
     residual = model.stress - (mean if model.condensed is None else model.condensed(mean.T).T)
     exponent = np.empty(len(residual))  # the squared residual plus the log determinant

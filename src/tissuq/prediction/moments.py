@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -43,7 +43,6 @@ __all__ = [
     "variance_of_noise",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MAX_LOCKED_PROBABILITY = 1e-6
 """Probability that the material locks before a stretch, below which a stress there is predicted."""
@@ -57,7 +56,7 @@ MAX_STRESSES_AT_ONCE = 1_000_000
 class CorrelatedGroup:
     """Components of a posterior that share one structure, by their indices, and the covariances of their data."""
 
-    components: NDArray[np.intp]
+    components: IndexArray
     shape: dict[str, float]
     design: FloatArray
     covariance: SpectralCovariance
@@ -288,7 +287,7 @@ def drawn_stress(
 
 def stresses_beyond(
     model: StatisticalModel, drawn: GaussianMixture, states: States, probability: FloatArray
-) -> Iterator[tuple[tuple[NDArray[np.intp], ...], FloatArray]]:
+) -> Iterator[tuple[tuple[IndexArray, ...], FloatArray]]:
     """Yield indices of draws and states (g,) beyond the range of the data, and the stresses there.
 
     They go on along rays (`tissuq.mechanics.rays`), their exponents with errors at probabilities (M,). The draws of
@@ -336,7 +335,7 @@ def conditioned_jointly(
 
 def _energies(
     model: StatisticalModel, components: GaussianMixture, states: States
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, IndexArray]]:
     """Yield means (N, g), roots (N, g, q) and further variances (N, g) of energy discrepancies, and whose they are.
 
     Beyond q the roots are zero. What the terms that serve the data leave of the discrepancy elsewhere is independent of
@@ -358,7 +357,7 @@ def _energies(
 
 def energy_terms(
     model: StatisticalModel, components: GaussianMixture, states: States
-) -> Iterator[tuple[Member, NDArray[np.intp], list[FloatArray], slice]]:
+) -> Iterator[tuple[Member, IndexArray, list[FloatArray], slice]]:
     """Yield energy discrepancies, whose they are, the stresses of their terms, and where the weights of these are."""
     start = len(model.linear)
     assert components.member is not None  # noqa: S101 (the caller has looked)

@@ -6,16 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.curve import Curve
 from tissuq.inference.solution import Solution
 from tissuq.prediction.bands import asked_for, centre_and_ends, predictive_mixtures
 
 __all__ = ["Judged", "interval_score", "judged", "root_mean_square"]
-
-FloatArray = NDArray[np.float64]
 
 
 def interval_score(low: FloatArray, high: FloatArray, values: FloatArray, prob: float) -> FloatArray:
@@ -53,7 +51,7 @@ class Judged:
     prob: float
 
     @property
-    def is_inside(self) -> NDArray[np.bool_]:
+    def is_inside(self) -> BoolArray:
         """Which measurements (n,) lie in the interval."""
         return np.asarray((self.low <= self.measured) & (self.measured <= self.high))
 
@@ -62,7 +60,7 @@ class Judged:
         names = ("measured", "median", "low", "high", "crps")
         return replace(self, **{name: getattr(self, name) * ratio for name in names})
 
-    def where(self, selected: NDArray[np.bool_]) -> Judged:
+    def where(self, selected: BoolArray) -> Judged:
         """Return some of them."""
         columns = {name: value[selected] for name, value in vars(self).items() if name != "prob"}
         return Judged(**columns, prob=self.prob)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -26,7 +26,6 @@ from tissuq.prediction.moments import (
 
 __all__ = ["Stress"]
 
-FloatArray = NDArray[np.float64]
 
 MIN_DRAWS = 6000
 """Draws, at the least, that stand for a posterior beyond the range of its data."""

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.drawing.panels import limits_of
 from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -23,7 +23,6 @@ from tissuq.report.figures import described_curves
 
 __all__ = ["chart_data"]
 
-FloatArray = NDArray[np.float64]
 
 GRID_POINTS = 41
 """Stretches at which the bands of a mode that was not measured are drawn."""
@@ -53,7 +52,7 @@ class _Test(NamedTuple):
     measured: FloatArray
     control: int = 0
     is_curve: bool = True
-    is_back: NDArray[np.bool_] = np.zeros(0, dtype=bool)
+    is_back: BoolArray = np.zeros(0, dtype=bool)
 
     @property
     def abscissa(self) -> FloatArray:
@@ -134,13 +133,13 @@ def _measured(described: Sequence[Described]) -> Iterator[_Test]:
                         is_curve, is_back)  # fmt: skip
 
 
-def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
+def _spread(indices: IndexArray) -> IndexArray:
     """Return so many places as are drawn, spread over all."""
     count = min(len(indices), MAX_MEASUREMENTS)
     return np.asarray(indices[np.unique(np.linspace(0, len(indices) - 1, count).astype(int))])
 
 
-def _drawn(indices: NDArray[np.intp], is_curve: bool) -> NDArray[np.intp]:
+def _drawn(indices: IndexArray, is_curve: bool) -> IndexArray:
     """Return the places at which bands are drawn: where they are no curve, those of the measurements that are."""
     return indices if is_curve else _spread(indices)
 
@@ -180,7 +179,7 @@ def _of_others(posterior: Posterior, tests: Sequence[_Test]) -> Iterator[_Bands 
             yield _Bands(measurements, stress, material_stress)
 
 
-def _at(band: Band, indices: NDArray[np.intp]) -> Band:
+def _at(band: Band, indices: IndexArray) -> Band:
     return Band(*(values[indices] for values in (band.stretch, band.median, band.low, band.high)))
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.decks.calculix_results import CELL_TYPES
 from tissuq.decks.fields import FinalFields
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["band_over_time", "quantity_figure", "state_figure", "write_fields"]
-
-FloatArray = NDArray[np.float64]
 
 
 def band_over_time(bands: Bands, name: str) -> Figure:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tissuq.arrays import FloatArray
 from tissuq.assessment.extent import has_energy
 from tissuq.drawing.panels import columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
@@ -29,7 +27,6 @@ __all__ = [
     "save_figure",
 ]
 
-FloatArray = NDArray[np.float64]
 
 WIDTHS = {1: 6.0, 2: 9.2, 3: 11.5}
 """Of figures with so many panels side by side, inches."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.uses import COMPUTING, UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 __all__ = ["prediction_figure", "prediction_result"]
 
-FloatArray = NDArray[np.float64]
 
 SCORES = ("crps", "interval_score")
 """Columns that are stresses."""

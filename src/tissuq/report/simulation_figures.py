@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, TRUTH, new_figure
 from tissuq.finite_elements.case import ACROSS, AXIAL, Mesh
@@ -34,7 +34,6 @@ __all__ = [
     "write_vtu",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
@@ -182,9 +181,7 @@ def _draw_section(
     figure.colorbar(drawn, ax=axis, shrink=0.85)
 
 
-def write_vtu(
-    path: Path, mesh: Mesh, points: Mapping[str, NDArray[np.float64]], cells: Mapping[str, NDArray[np.float64]]
-) -> None:
+def write_vtu(path: Path, mesh: Mesh, points: Mapping[str, FloatArray], cells: Mapping[str, FloatArray]) -> None:
     """Write a mesh with fields of its points and its cells; unless it has axes of its own, y is along the axis.
 
     Fields of points with several columns are displacements with the axes of the mesh, and become vectors.

@@ -15,9 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation.adaptive import EmulationSettings, Runner, calibrated
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator
@@ -39,8 +39,6 @@ from tissuq.studies.stream import (
 )  # fmt: skip
 
 __all__ = ["calibrate", "runs_of"]
-
-FloatArray = NDArray[np.float64]
 
 
 def calibrate(

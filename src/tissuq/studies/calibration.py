@@ -12,8 +12,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.emulation import Calibration, Forward
 from tissuq.emulation.material_posterior import check_material
 from tissuq.emulation.problem import symbol_of
@@ -38,7 +38,6 @@ from tissuq.studies.stream import Step, silent
 
 __all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
 
-FloatArray = NDArray[np.float64]
 
 PROPORTIONAL_BY_CHANCE = 4
 """Fewest measurements of which it shows that they are those of another file in another unit."""

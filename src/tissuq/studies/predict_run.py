@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment.stability import measured_range, measured_states
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.checked_arrays import checked_points
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["predict_run", "predicted", "run_prediction"]
-
-FloatArray = NDArray[np.float64]
 
 
 def predict_run(

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.drawing.panels import panels
 from tissuq.experiments.checked_arrays import headed, in_unit
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Prediction", "calibrated_points", "draw_prediction", "range_of"]
 
-FloatArray = NDArray[np.float64]
 
 ROWS_SHOWN = 9
 """Rows of a notebook's table."""
@@ -105,7 +104,7 @@ class Prediction:
         return {f"stretch{number if number > 1 else ''}": column for number, column in enumerate(columns, 1)}
 
     @cached_property
-    def is_calibrated(self) -> NDArray[np.bool_]:
+    def is_calibrated(self) -> BoolArray:
         """At which points (g,) the state is among those that were measured."""
         return calibrated_points(self.posterior, self.mode, self.points)
 
@@ -122,7 +121,7 @@ class Prediction:
         return bool((self.is_calibrated & (self.points < 1)).any())
 
     @property
-    def is_data_calibrated(self) -> NDArray[np.bool_]:
+    def is_data_calibrated(self) -> BoolArray:
         """Of which measurements (n,) that is true."""
         assert self.data is not None  # noqa: S101 (requested only if there are measurements)
         return calibrated_points(self.posterior, self.mode, self.data.stretch)
@@ -195,7 +194,7 @@ class Prediction:
         rows: list[dict[str, Any]] = []
         unit = self.unit
         for channel, name in enumerate(self.stresses):
-            columns: dict[str, FloatArray | NDArray[np.bool_]] = self.controls | {"is_calibrated": self.is_calibrated}
+            columns: dict[str, FloatArray | BoolArray] = self.controls | {"is_calibrated": self.is_calibrated}
             for kind in self.kinds:
                 prefix = "" if kind else "alone_"
                 stress, noisy = (self.curves[channel, kind, noise] for noise in (False, True))
@@ -266,7 +265,7 @@ def range_of(posterior: Posterior, mode: LoadingMode) -> tuple[float, float] | N
     return calibrated_range(posterior.model, mode, is_directed=posterior.solution.is_directed)
 
 
-def calibrated_points(posterior: Posterior, mode: LoadingMode, points: FloatArray) -> NDArray[np.bool_]:
+def calibrated_points(posterior: Posterior, mode: LoadingMode, points: FloatArray) -> BoolArray:
     """Return at which points (g,) or (g, c) of a mode the state is among those that were measured."""
     return is_calibrated(posterior.model, mode, points, is_directed=posterior.solution.is_directed)
 

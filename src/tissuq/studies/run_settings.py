@@ -12,9 +12,7 @@ from tissuq.studies.measured_file import MeasuredFile, ReadingSettings
 from tissuq.studies.option import Settings, argument, option, seed
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from tissuq.arrays import FloatArray
     from tissuq.mechanics import Material
     from tissuq.next_test.candidates import Candidate
 
@@ -110,7 +108,7 @@ class PredictionSettings(RunSettings):
             )
         return self.mode or stated or modes[0]
 
-    def points_of(self, mode: str) -> NDArray[np.float64] | None:
+    def points_of(self, mode: str) -> FloatArray | None:
         """Return the points that were asked for, (g,) or (g, 2); None where none were.
 
         Raises
@@ -191,7 +189,7 @@ class DesignSettings(RunSettings):
         ]
 
 
-def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
+def stretches(text: str, points: int = POINTS) -> FloatArray:
     """Return the numbers that a text means: ``0.7:2.0`` so many from end to end, ``1.1,1.2,1.5`` these.
 
     Raises

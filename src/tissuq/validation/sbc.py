@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.marginal import Marginal
@@ -118,9 +119,6 @@ class SbcSettings(SbcOptions):
         noise_sd = self.design.noise_sd if noise == "known" else noise
         law = material_named(self.material)
         return model_of(formulation, self.design.mode, self.design.stretch, noise_sd, self.chosen_priors, law)
-
-
-FloatArray = NDArray[np.float64]
 
 
 def draw_from_prior(model: StatisticalModel, generator: np.random.Generator) -> tuple[dict[str, float], FloatArray]:
@@ -289,7 +287,7 @@ SIZE = 0.05
 
 def probabilities_of(
     settings: SbcSettings, results: Sequence[dict[str, Any]]
-) -> Mapping[tuple[str, str, str], NDArray[np.float64]]:
+) -> Mapping[tuple[str, str, str], FloatArray]:
     """Return the probabilities below the truth by formulation, noise and parameter; nan where a fit failed."""
     ranks: dict[tuple[str, str, str], list[float]] = {}
     for result in results:

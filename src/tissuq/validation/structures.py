@@ -9,9 +9,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import field_validator
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
@@ -45,8 +45,6 @@ __all__ = [
     "summarise_structures",
     "tasks_of",
 ]
-
-FloatArray = NDArray[np.float64]
 
 
 class KnownLaw(NamedTuple):

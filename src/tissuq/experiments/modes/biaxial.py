@@ -7,8 +7,9 @@ from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes.mode import AlongAxis2, Control, LoadingMode
 from tissuq.experiments.modes.one_control import Planar
 from tissuq.experiments.modes.path import Deformation, Path
@@ -78,7 +79,7 @@ class ThinTube(Biaxial):
     @staticmethod
     def engineering_stresses(
         stretch: ArrayLike, pressure: ArrayLike, reduced_force: ArrayLike, radius: float, thickness: float
-    ) -> NDArray[np.float64]:
+    ) -> FloatArray:
         """Return hoop and axial engineering stress (n, 2) in MPa.
 
         Virtual work: the energy 2 pi R H L dW of a wall of radius R, thickness H and length L is p dv + f dl with the

@@ -8,8 +8,9 @@ from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes.path import Deformation, Path, States
 from tissuq.registry import find, variants
@@ -145,7 +146,7 @@ class LoadingMode(ABC):
         """The point at which nothing is deformed: a number, or (c,) of several controls."""
         return self.excursion(0.0)
 
-    def excursion(self, change: ArrayLike) -> NDArray[np.float64]:
+    def excursion(self, change: ArrayLike) -> FloatArray:
         """Return points on a line through the reference: the first control changes so much, every further one less."""
         rates = 1 / np.arange(1.0, 1 + len(self.controls))
         points = np.array([control.reference for control in self.controls]) + np.multiply.outer(change, rates)

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
+
 __all__ = ["STEP", "TINY", "UNMEASURED", "Deformation", "Path", "States"]
 
-FloatArray = NDArray[np.float64]
 
 STEP = 1e-30
 """Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
@@ -122,7 +123,7 @@ class States:
         return [len(points) for points in self.points]
 
     @property
-    def curve(self) -> NDArray[np.intp]:
+    def curve(self) -> IndexArray:
         """The number (n,) of the curve of every state."""
         return np.repeat(self.curves, self._counts)
 
@@ -221,7 +222,7 @@ class States:
         is_tilted = (c12.real != 0) | (order * cosine.real < 0)
         return np.where(is_tilted, angle, 0.0), np.where(is_tilted, rate / STEP / self.loaded_axes, 0.0)
 
-    def by_path(self) -> Iterator[tuple[Path, Any, NDArray[np.intp]]]:
+    def by_path(self) -> Iterator[tuple[Path, Any, IndexArray]]:
         """Yield every different path with all its points, and their numbers among all states."""
         numbers = np.split(np.arange(len(self)), np.cumsum(self._counts)[:-1])
         for path in dict.fromkeys(self.paths):
@@ -233,7 +234,7 @@ class States:
         """Return one of so many states of every path, from its first."""
         return States(self.paths, tuple(points[::step] for points in self.points), self.curves)
 
-    def among(self, numbers: Sequence[int] | NDArray[np.intp]) -> States:
+    def among(self, numbers: Sequence[int] | IndexArray) -> States:
         """Return the states of increasing numbers."""
         ends, rows = np.cumsum(self._counts), np.asarray(numbers)
         pieces = zip(self.paths, self.points, self.curves, ends, self._counts, strict=True)

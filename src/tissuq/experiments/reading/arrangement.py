@@ -8,8 +8,8 @@ from dataclasses import replace
 from itertools import chain, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.numbers import NUMBER, number_and_unit, number_in
 from tissuq.experiments.reading.headings import (
     dimensions_named,
@@ -116,7 +116,7 @@ def _is_named(cells: Sequence[Sequence[str]], row: int) -> bool:
     return any(a == b != c and c and not NUMBER.fullmatch(c) for a, b, c in rows)
 
 
-def _numbers(texts: Sequence[Sequence[str]]) -> NDArray[np.float64]:
+def _numbers(texts: Sequence[Sequence[str]]) -> FloatArray:
     """Return the numbers (rows, columns) in columns that change; nan for cells without one."""
     cells = np.array([[number_in(cell) for cell in row] for row in texts])
     has_numbers = np.isfinite(cells[0])
@@ -124,7 +124,7 @@ def _numbers(texts: Sequence[Sequence[str]]) -> NDArray[np.float64]:
     return np.asarray(cells[:, np.nanmax(cells, axis=0) > np.nanmin(cells, axis=0)])
 
 
-def _begins_anew(numbers: NDArray[np.float64], row: int) -> bool:
+def _begins_anew(numbers: FloatArray, row: int) -> bool:
     """Tell whether a row begins like the first, and in a column far from the row before it."""
     span = np.nanmax(numbers, axis=0) - np.nanmin(numbers, axis=0)
     is_same = np.abs(numbers[row] - numbers[0]) <= SAME * span

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isclose, pi, prod
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.stated_sizes import StatedSize
 from tissuq.experiments.reading.tube import Tube
@@ -60,7 +58,7 @@ class Dimensions:
     averages: tuple[str, ...] = ()
     is_one_of_several: bool = False
     open_height: str = ""
-    axial_stretch: NDArray[np.float64] | float = 1.0
+    axial_stretch: FloatArray | float = 1.0
 
     @property
     def length(self) -> Dimension:

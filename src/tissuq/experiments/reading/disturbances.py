@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import IndexArray
 from tissuq.experiments.reading.table import Column
 
 __all__ = [
@@ -171,7 +171,7 @@ class _Lines(NamedTuple):
         return np.sqrt(1 / self.points + (course - self.centre) ** 2 / self.size)
 
 
-def _lines(course: Column, load: Column, points: int, starts: NDArray[np.intp]) -> _Lines:
+def _lines(course: Column, load: Column, points: int, starts: IndexArray) -> _Lines:
     """Return the lines through so many points each, from starts on."""
     windows = np.lib.stride_tricks.sliding_window_view
     ways, loads = windows(course, points)[starts], windows(load, points)[starts]
@@ -208,14 +208,14 @@ def _fall(course: Column, load: Column, band: float) -> float:
     return fall if fall > max(HOLD_FALL, SCATTERS * scatter) else 0.0
 
 
-def ends_of_rests(stretch: Column) -> NDArray[np.intp]:
+def ends_of_rests(stretch: Column) -> IndexArray:
     """Return the last row of every rest: where a test stands still for longer than it takes to pass a level.
 
     Rows at a level are counted; their median over all levels is that of a test that passes on.
     """
     band, levels = STILL * float(np.ptp(stretch)), np.sort(stretch)
 
-    def rows_at(level: Column) -> NDArray[np.intp]:
+    def rows_at(level: Column) -> IndexArray:
         return np.searchsorted(levels, level + band, "right") - np.searchsorted(levels, level - band, "left")
 
     passing = float(np.median(rows_at(np.linspace(levels[0], levels[-1], int(0.5 / STILL)))))
@@ -229,7 +229,7 @@ def ends_of_rests(stretch: Column) -> NDArray[np.intp]:
     return np.array(ends, dtype=np.intp)
 
 
-def averaged(most_points: int, *columns: Column) -> tuple[NDArray[np.intp], list[Column]]:
+def averaged(most_points: int, *columns: Column) -> tuple[IndexArray, list[Column]]:
     """Return the rows at which the points begin and the last one ends, and each column averaged to so many at most."""
     count = len(columns[0])
     ends = np.linspace(0, count, min(count, most_points) + 1).astype(np.intp)
@@ -244,7 +244,7 @@ def scatter_of_neighbours(values: Column) -> float:
     return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6) if len(values) > 2 else 0.0
 
 
-def find_outliers(values: Column) -> NDArray[np.intp]:
+def find_outliers(values: Column) -> IndexArray:
     """Return the rows whose value lies far off, on the same side of what three pairs of neighbours extrapolate to.
 
     A row at a sudden fall goes on from the rows before it, and one at a turning point from those on either side.
@@ -270,7 +270,7 @@ def _scatter(away: Column) -> Column:
     return np.asarray(1.4826 / np.sqrt(1.5) * np.maximum(medians[of_block], np.median(away)))
 
 
-def find_saturation(load: Column) -> NDArray[np.intp]:
+def find_saturation(load: Column) -> IndexArray:
     """Return the rows at exactly the largest load where they are many: it was the most that the load cell reads."""
     size = np.abs(load)
     values, counts = np.unique(size, return_counts=True)

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.checked_arrays import LARGE_STRETCH
 from tissuq.experiments.modes import Biaxial, Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
@@ -214,7 +214,7 @@ def _gap_of_branches(course: Column, stress: Column, cycle: Cycle) -> float:
     return float(np.abs(loading - unloading).max())
 
 
-def _nearest_to_reference(reading: Reading) -> tuple[NDArray[np.float64], int]:
+def _nearest_to_reference(reading: Reading) -> tuple[FloatArray, int]:
     """Return how far every measurement is from the reference, and which is the nearest."""
     mode, points = reading.experiment.mode, reading.experiment.stretch
     change = np.abs((points - mode.reference).reshape(len(points), -1)).max(axis=1)

@@ -7,13 +7,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.modes.path import STEP
 
 __all__ = ["EVERY_LAW", "LawMixture", "not_negative"]
 
-FloatArray = NDArray[np.float64]
 
 ANGLES, COUPLINGS = np.linspace(0, np.pi / 2, 19), (0.0, 0.5, 1.0)
 RATES_OF_FIBRES, RATES_OF_MATRIX = np.geomspace(0.1, 60, 16), np.geomspace(0.1, 20, 10)
@@ -37,11 +36,11 @@ class LawMixture:
     shares: FloatArray
     rates: FloatArray
 
-    def taken(self, which: NDArray[np.bool_]) -> LawMixture:
+    def taken(self, which: BoolArray) -> LawMixture:
         """Return some of the laws."""
         return LawMixture(self.shares[:, which], self.rates[which])
 
-    def are_known(self, hoop: FloatArray, axial: FloatArray) -> NDArray[np.bool_]:
+    def are_known(self, hoop: FloatArray, axial: FloatArray) -> BoolArray:
         """Tell of which laws (k,) measurements at some stretches (n,) can say more than at the last of them."""
         grown = np.stack(_measures(hoop, axial), axis=-1) @ self.shares * self.rates
         return np.asarray(grown.max(axis=0) <= STEEPEST)

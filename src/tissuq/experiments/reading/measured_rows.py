@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import IndexArray
 from tissuq.errors import InputError
 from tissuq.experiments.branches import REVERSAL, turning_points
 from tissuq.experiments.reading.disturbances import ends_of_rests
@@ -40,7 +40,7 @@ class Cycle:
     peak: int
     stop: int
 
-    def rows(self, branch: str | None = None) -> NDArray[np.intp]:
+    def rows(self, branch: str | None = None) -> IndexArray:
         """Return its rows, or those of one branch; both branches have the turning point."""
         start = self.peak if branch == "unloading" else self.start
         stop = self.peak + 1 if branch == "loading" else self.stop
@@ -80,7 +80,7 @@ class MeasuredRows:
     """
 
     table: Table
-    rows: NDArray[np.intp]
+    rows: IndexArray
     stretch: Column
     stress: Column
     standard_error: Column
@@ -115,7 +115,7 @@ class MeasuredRows:
         """Return the rows with a sentence about one more step, or one for each stress."""
         return replace(self, steps=(*self.steps, *labelled(self.labels, sentences)))
 
-    def taken(self, rows: NDArray[np.intp]) -> MeasuredRows:
+    def taken(self, rows: IndexArray) -> MeasuredRows:
         """Return some of the rows, in their order."""
         if len(rows) == len(self):
             return self
@@ -123,7 +123,7 @@ class MeasuredRows:
         axial_stretch = None if self.axial_stretch is None else self.axial_stretch[rows]
         return replace(self, table=self.table.taken(rows), rows=self.rows[rows], axial_stretch=axial_stretch, **columns)
 
-    def kept(self, rows: NDArray[np.intp], reason: str) -> MeasuredRows:
+    def kept(self, rows: IndexArray, reason: str) -> MeasuredRows:
         """Return some of the rows, the others dropped for a reason."""
         count = len(self) - len(rows)
         if not count:

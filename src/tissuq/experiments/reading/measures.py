@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
@@ -17,7 +17,6 @@ from tissuq.experiments.reading.twisted_disc import rim_stress
 
 __all__ = ["STRAIN_MEASURES", "STRESS_MEASURES", "StrainMeasure", "StressMeasure", "measure_of_tube"]
 
-FloatArray = NDArray[np.float64]
 
 ENGINEERING = (
     r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|инженерн\w+|"

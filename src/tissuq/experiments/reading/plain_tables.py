@@ -10,8 +10,8 @@ from operator import methodcaller
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import GROUPED, MEAN_WITH_SPREAD, NUMBER, number_in
 from tissuq.experiments.reading.headings import heading, of_spread, plain
@@ -29,7 +29,7 @@ MOST_ROWS, FEWEST_MEASUREMENTS = 8, 5
 """Rows that a summary has at most, and a table above it at least."""
 JUMP, JUMP_OF_RANGE = 3.0, 0.02
 """Times the largest step in a column, and share of its range beyond that, by which a row does not go on from above."""
-STATISTICS: dict[str, Callable[[NDArray[np.float64]], Any]] = {
+STATISTICS: dict[str, Callable[[FloatArray], Any]] = {
     "maximum": np.max,
     "minimum": np.min,
     "mean": np.mean,
@@ -159,7 +159,7 @@ def _place(table: Table, start: int) -> str:
     return f"{table.counted} {top}" if top == bottom else f"{table.counted}s {top} to {bottom}"
 
 
-def _parted(table: Table, start: int) -> tuple[NDArray[np.float64], list[tuple[str, ...]], NDArray[np.bool_]]:
+def _parted(table: Table, start: int) -> tuple[FloatArray, list[tuple[str, ...]], BoolArray]:
     """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
     cells = table.cells()
     numbers = np.array([[number_in(cell) for cell in row] for row in cells[:start]])
@@ -186,7 +186,7 @@ def _start_of_labels(table: Table) -> int | None:
     return None
 
 
-def _statistic(row: Sequence[str], numbers: NDArray[np.float64], of_numbers: NDArray[np.bool_]) -> str:
+def _statistic(row: Sequence[str], numbers: FloatArray, of_numbers: BoolArray) -> str:
     """Return which statistic all numbers of a row are, to their last digit; an empty text if none."""
     columns = [column for column in np.flatnonzero(of_numbers).tolist() if NUMBER.fullmatch(row[column])]
     if len(columns) < 2 and not (columns and _has_word(row, of_numbers)):
@@ -197,7 +197,7 @@ def _statistic(row: Sequence[str], numbers: NDArray[np.float64], of_numbers: NDA
     return ""
 
 
-def _jumps(numbers: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_numbers: NDArray[np.bool_]) -> bool:
+def _jumps(numbers: FloatArray, beneath: Sequence[Sequence[str]], of_numbers: BoolArray) -> bool:
     """Tell whether rows do not go on from the ones above as those do among themselves."""
     values = np.array([[number_in(cell) for cell in row] for row in beneath])
     numbers, steps = (
@@ -208,7 +208,7 @@ def _jumps(numbers: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_nu
     return bool((np.nan_to_num(steps) > allowed).any())
 
 
-def _has_word(row: Sequence[str], of_numbers: NDArray[np.bool_]) -> bool:
+def _has_word(row: Sequence[str], of_numbers: BoolArray) -> bool:
     return any(_is_word(row[column]) for column in np.flatnonzero(of_numbers).tolist())
 
 

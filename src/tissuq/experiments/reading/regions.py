@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import IndexArray
 from tissuq.experiments.modes.mode import Control, LoadingMode
 from tissuq.experiments.reading.disturbances import (
     UNIFORM_SD,
@@ -47,7 +47,7 @@ class Region:
     """Rows of a test, of those that are used, in which something happened; what, and a sentence with what to do."""
 
     kind: str
-    rows: NDArray[np.intp]
+    rows: IndexArray
     text: str
 
 
@@ -82,12 +82,12 @@ class TestedStress:
         return int(np.argmax(np.abs(self.stress)))
 
     @cached_property
-    def branches(self) -> list[NDArray[np.intp]]:
+    def branches(self) -> list[IndexArray]:
         """The rows of loading of every cycle, without outliers."""
         return [np.setdiff1d(cycle.rows("loading"), self.outliers) for cycle in self.cycles]
 
     @cached_property
-    def outliers(self) -> NDArray[np.intp]:
+    def outliers(self) -> IndexArray:
         """Single rows far from their neighbours, in stress or course; not those at which a test begins anew."""
         outliers = np.union1d(find_outliers(self.stress), find_outliers(self.course))
         restarts = [
@@ -124,7 +124,7 @@ class TestedStress:
             events += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
         return events
 
-    def _away_from_reference(self, end: int) -> Iterator[NDArray[np.intp]]:
+    def _away_from_reference(self, end: int) -> Iterator[IndexArray]:
         """Iterate over the rows before one in which a branch goes away from the undeformed specimen, to either side."""
         away = self.course - self.control.reference
         for rows in (branch[branch < end] for branch in self.branches):
@@ -160,11 +160,11 @@ class TestedStress:
         rows = self.branches[0]
         return staircase_of(self.used.stretch[self.number][rows], self.stress[rows])
 
-    def lines(self, rows: NDArray[np.intp]) -> str:
+    def lines(self, rows: IndexArray) -> str:
         """Return the lines of the file in which rows stand, as one gives them to ``--leave-out``."""
         return self.used.table.lines_of(rows)
 
-    def place(self, rows: NDArray[np.intp]) -> str:
+    def place(self, rows: IndexArray) -> str:
         """Return where rows stand in the file, in words."""
         return f"{self.used.table.counted}{'s' * (len(rows) > 1)} {self.lines(rows)}"
 
@@ -348,7 +348,7 @@ def _slack(tested: TestedStress) -> Iterator[Region]:
     )
 
 
-def _leave_out(tested: TestedStress, rows: NDArray[np.intp]) -> str:
+def _leave_out(tested: TestedStress, rows: IndexArray) -> str:
     return f"to leave {'them' if len(rows) > 1 else 'it'} out give --leave-out {tested.lines(rows)}."
 
 

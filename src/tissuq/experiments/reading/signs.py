@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
@@ -247,7 +247,7 @@ def _check_signs(
         )
 
 
-def _wrong_sign(stretch: Column, stress: Column, rows: NDArray[np.bool_]) -> int | None:
+def _wrong_sign(stretch: Column, stress: Column, rows: BoolArray) -> int | None:
     """Return the row with the most negative work if the rows as a whole, beyond noise, do negative work."""
     change = stretch - 1
     work = np.where(rows, stress * change, 0.0)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.headings import heading
@@ -17,7 +17,7 @@ from tissuq.experiments.units import BRACKETS
 
 __all__ = ["Column", "Lines", "Table", "filled_on", "padded", "rows_in"]
 
-Column = NDArray[np.float64]
+Column = FloatArray
 Lines = list[tuple[int, str]]
 
 FEW_ROWS = 200
@@ -77,7 +77,7 @@ class Table:
     rows: list[str]
     lines: Sequence[int]
     head: Sequence[tuple[int, str]] = ()
-    block: NDArray[np.float64] | None = None
+    block: FloatArray | None = None
     notes: tuple[str, ...] = ()
     sheet: str = ""
     number: int = 0
@@ -108,7 +108,7 @@ class Table:
         line = "" if row is None else f", {self.counted} {self.lines[row]}"
         return f"{self.file}{line}, column {self.label(column)}"
 
-    def taken(self, rows: NDArray[np.intp]) -> Table:
+    def taken(self, rows: IndexArray) -> Table:
         """Return the table with only some rows, in that order."""
         positions = rows.tolist()
         block = None if self.block is None else self.block[rows]
@@ -186,7 +186,7 @@ class Table:
                 return list(block.T)
         raise self._bad_cell(columns)
 
-    def lines_of(self, rows: NDArray[np.intp]) -> str:
+    def lines_of(self, rows: IndexArray) -> str:
         """Return the lines of the file in which rows stand, such as ``31,45:50``."""
         runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
         spans = (f"{self.lines[run[0]]}:{self.lines[run[-1]]}" if len(run) > 1 else self.lines[run[0]] for run in runs)
@@ -225,7 +225,7 @@ class Table:
         text = f"without a value of {' or '.join(map(self.label, columns))} left out,"
         return table._without(is_partly[~is_missing] if table is not self else is_partly, text)
 
-    def _without(self, is_left_out: NDArray[np.bool_], text: str) -> Table:
+    def _without(self, is_left_out: BoolArray, text: str) -> Table:
         """Return the table without some rows, unless these are none or all, with a note of why."""
         if not is_left_out.any() or is_left_out.all():
             return self
@@ -242,7 +242,7 @@ class Table:
         advice = f" To leave out all rows that cannot be read: --leave-out {lines} (leave_out='{lines}')."
         return advice if is_advised else ""
 
-    def _is_faulty(self, columns: Sequence[int]) -> NDArray[np.bool_]:
+    def _is_faulty(self, columns: Sequence[int]) -> BoolArray:
         """Tell which rows have a cell in columns that is no finite number."""
         return np.array([any(map(_problem, row)) for row in zip(*map(self.texts, columns), strict=True)])
 
@@ -308,7 +308,7 @@ def filled_on(cells: Sequence[str]) -> list[str]:
     return filled
 
 
-def rows_in(lines: str, numbers: Sequence[int], file: str) -> NDArray[np.bool_]:
+def rows_in(lines: str, numbers: Sequence[int], file: str) -> BoolArray:
     """Tell which rows, of which the lines are numbers, stand in lines such as ``31,45:50``.
 
     Raises

@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.arrangement import (
@@ -159,7 +159,7 @@ def _of_data_frame(data: Any) -> Table:
     return without_summary(table)
 
 
-def _block(columns: Sequence[DataColumn]) -> NDArray[np.float64] | None:
+def _block(columns: Sequence[DataColumn]) -> FloatArray | None:
     """Return all cells of columns, where they are finite numbers."""
     try:
         block = np.column_stack([column.cells.astype(np.float64) for column in columns])

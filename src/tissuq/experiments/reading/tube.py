@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from math import log, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.law_mixture import EVERY_LAW, LawMixture, not_negative
 
 __all__ = ["SAME_STRETCH", "Tube", "rows_at_each_stretch"]
 
-FloatArray = NDArray[np.float64]
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 """Of Gauss quadrature through the wall, from the outer to the inner face."""
@@ -203,7 +202,7 @@ def _moved(measured: FloatArray, mean: FloatArray, in_middle: FloatArray) -> Flo
     return np.asarray(in_middle + ratio * (measured - mean))
 
 
-def rows_at_each_stretch(axial_stretch: FloatArray) -> list[NDArray[np.intp]]:
+def rows_at_each_stretch(axial_stretch: FloatArray) -> list[IndexArray]:
     """Return the rows at each axial stretch, of which those within a hundredth of one another are one."""
     order = np.argsort(axial_stretch, kind="stable")
     return np.split(order, 1 + np.flatnonzero(np.diff(axial_stretch[order]) > SAME_STRETCH))

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 
 __all__ = ["apparent_stress", "rim_stress"]
 
-FloatArray = NDArray[np.float64]
 
 MAX_DEGREE = 3
 """Degree of the polynomial."""

@@ -8,8 +8,8 @@ from itertools import islice
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy
 from tissuq.inference.enumerators.survey import climb
@@ -27,7 +27,6 @@ from tissuq.parameters.priors import Flat
 
 __all__ = ["IRRELEVANT_LOG_DROP", "AdaptedPoints"]
 
-FloatArray = NDArray[np.float64]
 
 POINTS_PER_PARAMETER = 256
 """Points of a round for each parameter, about: their number is a power of two."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.adapted_points import IRRELEVANT_LOG_DROP, AdaptedPoints
 from tissuq.inference.enumerators.line import FINE
@@ -38,7 +38,6 @@ from tissuq.parameters.priors import Flat
 
 __all__ = ["AdaptiveCells"]
 
-FloatArray = NDArray[np.float64]
 
 DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ModelError
 from tissuq.inference.box import NEGLIGIBLE_MASS, Boxes
 from tissuq.inference.enumerators.amplitudes import (
@@ -41,8 +41,6 @@ from tissuq.parameters.priors import Flat, Prior
 
 __all__ = ["AmplitudeLattice"]
 
-FloatArray = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 MAX_PRIOR_MASS_ERROR = 0.01
 """Error of the mass of an amplitude's prior, summed on every second point, up to which the lattice serves it."""
@@ -311,7 +309,7 @@ class _EnergySums:
         density /= density.sum(axis=1, keepdims=True) * step
         return marginal_of_table(noise_sd, density.mean(axis=0) / noise_sd)
 
-    def _settings(self, points: Points, node: Places) -> FloatArray:
+    def _settings(self, points: Points, node: IndexArray) -> FloatArray:
         """Return the nonlinear parameters (M, d)."""
         columns = dict(zip(self.model.energy_symbols, points.amplitudes.T, strict=True)) | {"noise_sd": points.noise_sd}
         for index, symbol in enumerate(self._outer.symbols):

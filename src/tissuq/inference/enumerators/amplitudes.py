@@ -8,8 +8,8 @@ from functools import cached_property, lru_cache
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.inference.enumerators.lattice import Lattice
 from tissuq.inference.enumerators.quadrature import gauss_rule
 from tissuq.inference.linear import LinearPriors
@@ -28,8 +28,6 @@ __all__ = [
     "noise_grid",
 ]
 
-FloatArray = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
 """Of the noise given the rest: values, and the reach of its logarithm around its mode, in standard deviations
@@ -65,9 +63,9 @@ class Points:
     ``log_weight``.
     """
 
-    lattice: Places
-    second_index: Places
-    first_index: Places
+    lattice: IndexArray
+    second_index: IndexArray
+    first_index: IndexArray
     noise_sd: FloatArray
     amplitudes: FloatArray
     log_weight: FloatArray
@@ -75,7 +73,7 @@ class Points:
     strain: FloatArray
     log_inside: FloatArray
 
-    def __getitem__(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
+    def __getitem__(self, index: IndexArray | BoolArray) -> Points:
         return Points(*(array[index] for array in vars(self).values()))
 
     @property
@@ -184,7 +182,7 @@ class Weighing:
         (mass,) = _masses([points])
         return [points[mass >= max(_least_that_matters(mass), np.exp(-IRRELEVANT_LOG_DROP))]]
 
-    def _known(self, member: int, mask: NDArray[np.bool_]) -> Points:
+    def _known(self, member: int, mask: BoolArray) -> Points:
         """Return points of a lattice (G2, G1) at the known noise, as if the linear parameters had no priors."""
         lattice, (second_index, first_index) = self._lattices[member], np.nonzero(mask)
         count = len(first_index)
@@ -256,7 +254,7 @@ class Weighing:
         log_cell += log_prior_of_noise(self._model, self._ratios, noise_sd)
         return replace(points_of_noise, log_weight=points_of_noise.log_weight + log_cell)
 
-    def _weighed(self, member: int, second_index: Places, first_index: Places, noise_sd: FloatArray) -> Points:
+    def _weighed(self, member: int, second_index: IndexArray, first_index: IndexArray, noise_sd: FloatArray) -> Points:
         """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
         lattice, symbols = self._lattices[member], self._model.energy_symbols
         log_weight = lattice.log_likelihood(self._index, second_index, first_index, noise_sd) + np.log(
@@ -276,7 +274,7 @@ class Weighing:
         return Points(numbers, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
 
     def _amplitudes(
-        self, lattice: Lattice, second_index: Places, first_index: Places, noise_sd: FloatArray
+        self, lattice: Lattice, second_index: IndexArray, first_index: IndexArray, noise_sd: FloatArray
     ) -> FloatArray:
         """Return the amplitudes (M, a) at points of a lattice; zero where its member has no such block."""
         amplitudes = np.zeros((len(first_index), len(self._model.energy_symbols)))
@@ -300,12 +298,12 @@ def known_log_weights(model: StatisticalModel, lattice: Lattice, data_sets: slic
     return np.asarray(log_weights)
 
 
-def _counts(lattices: Sequence[Lattice], points: Points) -> NDArray[np.intp]:
+def _counts(lattices: Sequence[Lattice], points: Points) -> IndexArray:
     """Return how many ratios of the second block and of the first one (2, M) the lattices of points have."""
     return np.array([lattice.misfit.shape[:2] for lattice in lattices])[points.lattice].T
 
 
-def at_end(lattices: Sequence[Lattice], points: Points) -> NDArray[np.bool_]:
+def at_end(lattices: Sequence[Lattice], points: Points) -> BoolArray:
     """Return which points (M,) are at the largest amplitudes of their lattice: it is not known what lies beyond."""
     counts, indices = _counts(lattices, points), np.stack([points.second_index, points.first_index])
     return np.asarray(((counts > 1) & (indices == counts - 1)).any(axis=0))
@@ -333,7 +331,7 @@ def linear_at(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[
     return mean, root
 
 
-def _log_cells(place_on_grid: Places, step: float) -> FloatArray:
+def _log_cells(place_on_grid: IndexArray, step: float) -> FloatArray:
     """Return the logarithms of the cells of places on a grid.
 
     The first one stands for all smaller amplitudes, too, among which the density is constant.

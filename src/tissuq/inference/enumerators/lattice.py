@@ -12,15 +12,13 @@ from math import log, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.linear import integrated
 from tissuq.model.discrepancy import Member, side_by_side
 
 __all__ = ["LOG_RATIO_STEP", "MAX_STRESS_RATIO", "Directions", "Lattice", "Reduced", "Rows"]
 
-FloatArray = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 LOG_RATIO_STEP = 0.4
 """Of log g. The posterior of an amplitude that r directions tell has an sd of about 1 / sqrt(2 r) in its logarithm."""
@@ -252,7 +250,7 @@ class Lattice:
         self.log_size = directions.log_size[:, :, None] - gaussian.log_volume + fit.log_size
 
     def log_likelihood(
-        self, data_set: int, second_index: Places, first_index: Places, noise_sd: FloatArray
+        self, data_set: int, second_index: IndexArray, first_index: IndexArray, noise_sd: FloatArray
     ) -> FloatArray:
         """Return log p(y | ratios, noise_sd) (M,), the linear parameters integrated with density one."""
         exponent = 0.5 * self.misfit[second_index, first_index, data_set] / noise_sd**2
@@ -265,7 +263,7 @@ class Lattice:
         log_size = np.repeat(self.log_size, self._per_design, axis=2)[:, :, data_sets]
         return np.asarray(-self.freedom * log_noise - 0.5 / noise_sd**2 * self.misfit[:, :, data_sets] - log_size)
 
-    def linear(self, data_set: int, second_index: Places, first_index: Places) -> tuple[FloatArray, FloatArray]:
+    def linear(self, data_set: int, second_index: IndexArray, first_index: IndexArray) -> tuple[FloatArray, FloatArray]:
         """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise."""
         design, number = divmod(data_set, self._per_design)
         root = self._root[second_index, first_index, design]

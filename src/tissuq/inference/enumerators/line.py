@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tissuq.arrays import FloatArray
 
 __all__ = ["FINE", "ROUGH", "Accuracy", "Line", "first_places", "known_along", "peaks"]
 
-FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
 FIRST_END, FIRST_PLACES = 4.0, 17

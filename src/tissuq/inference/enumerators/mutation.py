@@ -11,13 +11,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from blackjax.mcmc.random_walk import RWState
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.inference.coordinates import Box
 
 __all__ = ["Mutation", "Program", "compiled_program"]
 
-Floats = NDArray[np.float64]
 
 MAX_CORRELATION_WITH_START = 0.1
 """Correlation with the start of a mutation, in any direction, below which the particles count as moved.
@@ -50,13 +49,13 @@ class Mutation:
         self.key = jax.random.key(seed)
         self.count = 0
 
-    def __call__(self, lines: Floats, temperature: float) -> tuple[Floats, Floats, int, bool, Floats]:
+    def __call__(self, lines: FloatArray, temperature: float) -> tuple[FloatArray, FloatArray, int, bool, FloatArray]:
         """Return the moved particles, their log likelihoods, sweeps, whether they moved, and the acceptance."""
         covariance = _covariance(lines)
         root = np.linalg.cholesky(covariance)
         start, moved = lines, False
-        distances: list[Floats] = []
-        accepted: list[Floats] = []
+        distances: list[FloatArray] = []
+        accepted: list[FloatArray] = []
         while not moved and len(distances) < self.max_sweeps:
             self.count += 1
             key = jax.random.fold_in(self.key, self.count)
@@ -79,13 +78,13 @@ class Mutation:
         return lines, log_likelihoods, len(distances), moved, np.mean(accepted, axis=0)
 
 
-def _covariance(lines: Floats) -> Floats:
+def _covariance(lines: FloatArray) -> FloatArray:
     """Return the covariance of all particles, kept invertible should a coordinate have collapsed."""
     covariance = np.atleast_2d(np.cov(lines.reshape(-1, lines.shape[-1]).T))
     return covariance + 1e-10 * np.diag(np.diag(covariance) + np.finfo(float).tiny)
 
 
-def _has_moved(start: Floats, current: Floats, distances: list[Floats]) -> bool:
+def _has_moved(start: FloatArray, current: FloatArray, distances: list[FloatArray]) -> bool:
     """Return whether the particles have forgotten their start in every whitened direction, (d, particles) arrays.
 
     Either they are uncorrelated with it, or the median distance from it has stopped to grow: for a particle that
@@ -160,7 +159,7 @@ def compiled_program(
     return Program(compiled(sweep), compiled(densities), compiled(jax.vmap(jax.vmap(box.from_line))))
 
 
-def _jumps(clouds: Floats, generator: np.random.Generator) -> Floats:
+def _jumps(clouds: FloatArray, generator: np.random.Generator) -> FloatArray:
     """Return d jumps per particle along lines between two particles of a cloud, (runs, draws, d, d) array.
 
     Now and then a jump has the full length, which changes the mode. Half of them move only some coordinates,

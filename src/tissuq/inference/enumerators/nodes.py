@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.enumerators.amplitudes import Points, Weighing, at_end, known_log_weights, linear_at
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, MAX_STRESS_RATIO, Directions, Lattice, Rows
 from tissuq.inference.enumerators.outer import Outer
@@ -17,8 +17,6 @@ from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["OUTER_STEP", "Node", "Sums", "single_nodes"]
 
-FloatArray = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 UNLIKELY_PROBABILITY = 1e-3
 """Probability of an amplitude's prior below which a lattice may begin."""
@@ -102,11 +100,11 @@ class Sums:
         self._terms = _Terms([model])
         self._known: dict[tuple[int, int], Directions] = {}
 
-    def points(self, settings: FloatArray, members: Places) -> list[Points]:
+    def points(self, settings: FloatArray, members: IndexArray) -> list[Points]:
         """Return the points that matter at settings (N, d); ``lattice`` is a place among the members."""
         return [weighing.points()[0] for _, _, weighing in self._weighings(settings, members)]
 
-    def nodes(self, settings: FloatArray, members: Places) -> list[Node]:
+    def nodes(self, settings: FloatArray, members: IndexArray) -> list[Node]:
         """Return the posteriors at settings (N, d) of all but these, by few points of the same weight."""
         first_call, nodes = self._calls + 1, list[Node]()
         for lattices, index, weighing in self._weighings(settings, members):
@@ -118,7 +116,7 @@ class Sums:
             nodes.append(Node(points, mean, root, error, of_setting, self._outer.ratios(of_setting)))
         return nodes
 
-    def _weighings(self, settings: FloatArray, members: Places) -> Iterator[tuple[list[Lattice], int, Weighing]]:
+    def _weighings(self, settings: FloatArray, members: IndexArray) -> Iterator[tuple[list[Lattice], int, Weighing]]:
         """Yield the posterior at each setting (N, d), the lattices behind it, and its number there.
 
         Lattices begin at other amplitudes in turn.
@@ -130,7 +128,7 @@ class Sums:
             yield from (next(of_turns[turn]) for turn in turns)
 
     def _of_turn(
-        self, settings: FloatArray, members: Places, turn: int
+        self, settings: FloatArray, members: IndexArray, turn: int
     ) -> Iterator[tuple[list[Lattice], int, Weighing]]:
         rows, ratios = self._outer.rows(settings), self._outer.ratios(settings[0])
         lattices = [Lattice(self._directions(rows.scale, int(member), turn), rows) for member in members]

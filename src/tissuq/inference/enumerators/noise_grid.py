@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -25,7 +25,6 @@ from tissuq.parameters.priors import Flat, Prior
 
 __all__ = ["NoiseGrid", "at_level", "at_noise", "shares_with_factors", "with_known_noise"]
 
-FloatArray = NDArray[np.float64]
 
 SYMBOL = NOISE_SD.symbol
 END_FACTOR = 2.0

@@ -13,8 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 from blackjax.adaptation.step_size import dual_averaging_adaptation
 from blackjax.adaptation.window_adaptation import build_schedule
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.convergence import MAX_RHAT, Draws, check_minima, diagnostic
 from tissuq.inference.coordinates import (
@@ -29,7 +30,6 @@ from tissuq.inference.coordinates import (
 
 __all__ = ["NutsDraws", "NutsSettings", "sample_nuts"]
 
-Floats = NDArray[np.float64]
 
 MIN_ESS_PER_CHAIN = 100
 MAX_DIVERGENT_SHARE = 0.01
@@ -92,12 +92,12 @@ class NutsDraws(Draws):
     Betancourt (2016), arXiv:1604.00695 (BFMI).
     """
 
-    energies: Floats
+    energies: FloatArray
     divergences: int
     leapfrogs_per_draw: float
 
     @cached_property
-    def bfmi(self) -> Floats:
+    def bfmi(self) -> FloatArray:
         """Estimated fraction of missing information of the energy: (chains,) array."""
         return diagnostic("bfmi", self.energies)
 
@@ -204,7 +204,7 @@ def _overdispersed(derivatives: Derivatives, modes: Sequence[Mode], chains: int,
 
 def _start_around(
     derivatives: Derivatives, mode: Mode, generator: np.random.Generator
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return a point around a mode, closer at every failure, with its finite log density and gradient."""
     for shrinkage in 0.8 ** np.arange(50):
         offset = OVERDISPERSION_SDS * shrinkage * generator.standard_normal(mode.location.size)
@@ -276,7 +276,7 @@ def _bounds(box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(box.lower.tolist()), tuple(box.upper.tolist())
 
 
-def _schedule(settings: NutsSettings) -> tuple[NDArray[np.bool_], ...]:
+def _schedule(settings: NutsSettings) -> tuple[BoolArray, ...]:
     """Return by trajectory whether it is warm-up, feeds the mass matrix, and ends one of Stan's windows."""
     sampling = settings.draws * settings.thinning
     windows = np.asarray(build_schedule(settings.warmup), dtype=bool)

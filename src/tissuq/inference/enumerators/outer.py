@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.enumerators.lattice import Rows
 from tissuq.inference.enumerators.line import Line
 from tissuq.inference.marginal import Marginal, marginal_of_table
@@ -16,7 +16,6 @@ from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["TINY", "Outer"]
 
-FloatArray = NDArray[np.float64]
 
 LOG_RATIO_SD = 3.0
 """Standard deviation of the log of a ratio of noise parameters, in the coordinate that proposes it."""
@@ -69,7 +68,7 @@ class Outer:
         pairs = zip(self.symbols, settings, self.of_noise, strict=True)
         return {symbol: float(value) for symbol, value, of_noise in pairs if of_noise}
 
-    def alike(self, settings: FloatArray, count: int) -> Iterator[NDArray[np.intp]]:
+    def alike(self, settings: FloatArray, count: int) -> Iterator[IndexArray]:
         """Yield the rows of settings (N, d), so many at once at the most, of which the relative noise is the same."""
         count = 1 if self.of_noise.any() else count
         return iter(np.split(np.arange(len(settings)), range(count, len(settings), count)))

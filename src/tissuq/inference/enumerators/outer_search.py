@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy, first_places, known_along, peaks
 from tissuq.inference.enumerators.nodes import Node, Sums
@@ -18,7 +18,6 @@ from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["Guide", "relative_error", "weighted_nodes"]
 
-FloatArray = NDArray[np.float64]
 
 VALUES_PER_PARAMETER = 64
 """Values taken at first for each of the parameters, and once more."""

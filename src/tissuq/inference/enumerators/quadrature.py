@@ -9,14 +9,13 @@ from itertools import product
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE
 
 __all__ = ["MAX_DIMENSION", "START_PROBABILITIES", "Lines", "Quadrature", "gauss_rule", "has_missed", "integrate"]
 
-FloatArray = NDArray[np.float64]
 LogFunction = Callable[[FloatArray], FloatArray]
 
 MAX_DIMENSION = 3
@@ -48,7 +47,7 @@ class Cells:
     width: FloatArray
     log_values: FloatArray
 
-    def __getitem__(self, index: NDArray[np.bool_]) -> Cells:
+    def __getitem__(self, index: BoolArray) -> Cells:
         return Cells(self.lower[index], self.width[index], self.log_values[:, index])
 
     def joined(self, more: Cells) -> Cells:
@@ -94,7 +93,7 @@ class Lines:
         values = _row_values(self.series[line], t) * factor[line, column]
         return _summed(column, values, coordinates.shape[1])
 
-    def _inside(self, coordinates: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
+    def _inside(self, coordinates: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
         t = 2 * (coordinates - self.start[:, None]) / self.width[:, None] - 1
         line, column = np.nonzero((t >= -1) & (t < 1))
         return line, column, t[line, column]
@@ -219,7 +218,7 @@ def _resolve(cells: Cells, top: FloatArray) -> tuple[FloatArray, FloatArray]:
     return integrals, errors
 
 
-def _halved(log_function: LogFunction, cells: Cells, error: FloatArray, side: NDArray[np.intp]) -> Cells:
+def _halved(log_function: LogFunction, cells: Cells, error: FloatArray, side: IndexArray) -> Cells:
     """Halve the worst cells that together hold nine tenths of the error."""
     order = np.argsort(error)[::-1]
     count = int(np.searchsorted(np.cumsum(error[order]), 0.9 * error.sum())) + 1
@@ -245,7 +244,7 @@ def _finish(cells: Cells, top: FloatArray, integrals: FloatArray, error: FloatAr
     return Quadrature(cells, top + np.log(total[:, 0]), (error * fall).sum(axis=1), points, weights)
 
 
-def _summed(column: NDArray[np.intp], values: FloatArray, count: int) -> FloatArray:
+def _summed(column: IndexArray, values: FloatArray, count: int) -> FloatArray:
     """Return the sums of the values that belong to each of ``count`` places."""
     return np.asarray(np.bincount(column, values, minlength=count), dtype=np.float64)
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.inference.box import Boxes
 from tissuq.inference.densities import Density, conditional_density, joint_density
@@ -25,7 +25,6 @@ from tissuq.parameters.priors import Flat
 
 __all__ = ["JointNuts", "Nuts", "TemperedSmc", "sample_by_nuts", "sample_joint"]
 
-FloatArray = NDArray[np.float64]
 
 MAX_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp, ndtr, stdtrit
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.convergence import MAX_RHAT, Draws, check_minima
 from tissuq.inference.coordinates import Box
@@ -23,7 +24,6 @@ from tissuq.inference.quasi_monte_carlo import resampled_at_random
 
 __all__ = ["SmcDraws", "SmcSettings", "sample_smc"]
 
-Floats = NDArray[np.float64]
 
 MIN_ESS = 400
 MAX_LOG_EVIDENCE_ERROR = 0.3
@@ -93,15 +93,15 @@ class SmcDraws(Draws):
     Del Moral, Doucet & Jasra (2006), Journal of the Royal Statistical Society B 68, 411-436.
     """
 
-    increments: Floats
-    drifts: Floats
-    temperatures: Floats
+    increments: FloatArray
+    drifts: FloatArray
+    temperatures: FloatArray
     sweeps: NDArray[np.int64]
-    moved: NDArray[np.bool_]
-    acceptance: Floats
+    moved: BoolArray
+    acceptance: FloatArray
 
     @property
-    def log_evidences(self) -> Floats:
+    def log_evidences(self) -> FloatArray:
         """Log evidence of each run: (runs,) array."""
         return np.asarray(self.increments.sum(0))
 
@@ -133,7 +133,7 @@ class SmcDraws(Draws):
         """Number of distinct draws, which no effective sample size exceeds."""
         return len(np.unique(self.values.reshape(-1, self.values.shape[-1]), axis=0))
 
-    def _limited(self, sizes: Floats) -> Floats:
+    def _limited(self, sizes: FloatArray) -> FloatArray:
         return np.minimum(sizes, self.distinct)
 
     def _quality(self) -> str:
@@ -271,7 +271,7 @@ def sample_smc(
     return SmcDraws(values, labels, increments, drifts, temperatures, sweeps, moved, acceptance)
 
 
-def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> Floats:
+def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> FloatArray:
     """Return the prior draws on the real line: (runs, draws, d) array."""
     points = np.asarray(prior_draws, dtype=np.float64)
     expected = (settings.particles, box.is_bounded.size)
@@ -284,7 +284,7 @@ def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> 
     return np.stack([box.to_line(point) for point in points]).reshape(settings.runs, -1, expected[1])
 
 
-def _log_likelihoods_at_start(program: Program, lines: Floats, data: tuple[Any, ...]) -> Floats:
+def _log_likelihoods_at_start(program: Program, lines: FloatArray, data: tuple[Any, ...]) -> FloatArray:
     """Return the log likelihoods of the prior draws, (runs, draws) array, checked together with their prior."""
     log_likelihoods, log_priors = (np.asarray(array) for array in program.densities(lines, *data))
     if not np.isfinite(log_priors).all():
@@ -299,7 +299,7 @@ def _log_likelihoods_at_start(program: Program, lines: Floats, data: tuple[Any, 
     return log_likelihoods
 
 
-def _rise(log_likelihoods: Floats, largest_rise: float, ess_fraction: float) -> float:
+def _rise(log_likelihoods: FloatArray, largest_rise: float, ess_fraction: float) -> float:
     """Return the rise in temperature that leaves a share of the particles effective, on average over the runs.
 
     The share is of the particles with a positive likelihood: no rise brings back the others.
@@ -321,5 +321,5 @@ def _rise(log_likelihoods: Floats, largest_rise: float, ess_fraction: float) -> 
     return float(np.exp(low))
 
 
-def _log_mean(logarithms: Floats) -> float:
+def _log_mean(logarithms: FloatArray) -> float:
     return float(logsumexp(logarithms) - np.log(len(logarithms)))

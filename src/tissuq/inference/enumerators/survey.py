@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.parameters.priors import Prior
 
 __all__ = ["Survey", "Warp", "climb", "coordinates_of", "log_prior_density", "parameters_of", "survey", "warp_along"]
 
-FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
 PROBES = 10
@@ -41,19 +40,19 @@ class Survey:
     """
 
     structure: int
-    is_log: NDArray[np.bool_]
+    is_log: BoolArray
     lower: FloatArray
     upper: FloatArray
     mean: FloatArray
     covariance: FloatArray
 
 
-def parameters_of(coordinates: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
+def parameters_of(coordinates: FloatArray, is_log: BoolArray) -> FloatArray:
     """Return the parameters (..., d) of coordinates (..., d), some of which are logarithms."""
     return np.where(is_log, np.exp(np.where(is_log, coordinates, 0.0)), coordinates)
 
 
-def coordinates_of(parameters: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
+def coordinates_of(parameters: FloatArray, is_log: BoolArray) -> FloatArray:
     """Return the coordinates (..., d) of parameters (..., d): of some their logarithms."""
     return np.where(is_log, np.log(np.where(is_log, parameters, 1.0)), parameters)
 
@@ -143,7 +142,7 @@ def climb(
     return point, value, curvature
 
 
-def _probes(priors: Sequence[Prior], is_log: NDArray[np.bool_]) -> list[FloatArray]:
+def _probes(priors: Sequence[Prior], is_log: BoolArray) -> list[FloatArray]:
     """Return coordinates to try along each parameter."""
     powers, even = 0.5 ** np.arange(1, PROBES + 1), np.linspace(0.05, 0.95, PROBES)
     return [
@@ -237,7 +236,7 @@ class Warp:
         Given g before it, parameter j is centred on centre_j + slope_j (g - anchor).
     """
 
-    is_log: NDArray[np.bool_]
+    is_log: BoolArray
     lower: FloatArray
     upper: FloatArray
     anchor: FloatArray

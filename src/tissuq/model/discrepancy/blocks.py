@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import States
 from tissuq.mechanics.invariants import invariant_rates, invariants
 from tissuq.mechanics.rays import Range, dispersed
@@ -29,7 +29,6 @@ __all__ = [
     "ZeroModulusBlock",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MAX_EXPONENT = 200.0
 """Largest exponent of a kernel; it is reached only far beyond the data."""

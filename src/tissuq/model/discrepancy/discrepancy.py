@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics.material import Material
@@ -66,7 +66,7 @@ class Discrepancy(ABC):
         """One that costs less to integrate and stands for it where only a first idea of a posterior is wanted."""
         return self
 
-    def mean_basis(self, states: States) -> NDArray[np.float64]:
+    def mean_basis(self, states: States) -> FloatArray:
         """Return the (n, k) mean stresses of unit linear parameters, in their order."""
         return np.zeros((len(states), 0))
 

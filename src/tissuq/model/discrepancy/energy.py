@@ -9,8 +9,8 @@ from itertools import product
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
@@ -48,7 +48,6 @@ __all__ = [
     "side_by_side",
 ]
 
-FloatArray = NDArray[np.float64]
 
 AMPLITUDES = tuple(
     Parameter(symbol, f"amplitude of the {index} energy", "modulus", (0.0, float("inf")), False, HalfCauchy(1.0))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import States
 from tissuq.mechanics.laws.polynomial import C01, C20, C30, MooneyRivlin, Yeoh
 from tissuq.mechanics.material import Material
@@ -51,7 +51,7 @@ class Polynomial(IndependentError):
         ]
         object.__setattr__(self, "parameters", (*coefficients, S))
 
-    def mean_basis(self, states: States) -> NDArray[np.float64]:
+    def mean_basis(self, states: States) -> FloatArray:
         powers = np.vander(states.abscissa, self.degree + 1, increasing=True)
         of_curves = [powers * np.reshape(states.in_curve(curve), (-1, 1)) for curve in range(self.curves)]
         return np.hstack(of_curves) if self.curves > 1 else of_curves[0]
@@ -94,7 +94,7 @@ class HyperelasticTerms(IndependentError):
     terms: ClassVar[tuple[Parameter, ...]]
     is_energy = True
 
-    def mean_basis(self, states: States) -> NDArray[np.float64]:
+    def mean_basis(self, states: States) -> FloatArray:
         columns = [self.material.parameters.index(term) for term in self.terms]
         return stress_basis(self.material, states)[:, columns]
 

@@ -10,8 +10,8 @@ from math import sqrt
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.experiment import Experiment
@@ -146,9 +146,6 @@ class PinnedProcess(ConditionedProcess):
     def kernel_diagonal(self, curve: int, abscissa: Any, values: Mapping[str, Any]) -> Any:
         score = (abscissa - self.references[curve]) / values["psi"]
         return pinned_squared_exponential(score, score, 1)
-
-
-FloatArray = NDArray[np.float64]
 
 
 class RangeProcess(ConditionedProcess):

@@ -8,8 +8,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment import Average
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -35,7 +35,6 @@ __all__ = [
     "unseen_stretches",
 ]
 
-FloatArray = NDArray[np.float64]
 
 POINTS = 12
 """Stretches of a loading mode that was not measured."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.assessment import Average, average
 from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
@@ -57,7 +57,7 @@ def parts_of(formulation: str) -> tuple[str, ...]:
 def model_of(
     formulation: str,
     mode: str,
-    stretch: NDArray[np.float64],
+    stretch: FloatArray,
     noise_sd: NoiseSd,
     priors: Mapping[str, Prior],
     material: Material = PLAIN,

@@ -7,9 +7,9 @@ from importlib.resources import files
 from typing import Annotated, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError, TissuqError
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.invariants import largest_invariants
@@ -75,7 +75,7 @@ class Design(BaseModel):
         return f"{mode}[{self.low:g}, {self.high:g}] n={self.points} sd={self.noise_sd:g}"
 
     @property
-    def stretch(self) -> NDArray[np.float64]:
+    def stretch(self) -> FloatArray:
         """Equally spaced stretches."""
         return np.linspace(self.low, self.high, self.points)
 

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.invariants import invariant_rates, invariants
 
@@ -45,7 +45,6 @@ __all__ = [
     "yeoh",
 ]
 
-FloatArray = NDArray[np.float64]
 Law = Callable[[LoadingMode, FloatArray], FloatArray]
 """The engineering stress (n,) at stretches (n,) in a loading mode, in units of C10."""
 Derivatives = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]

@@ -8,9 +8,9 @@ from time import perf_counter
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics import NeoHookean, Yeoh, simulate
@@ -85,7 +85,7 @@ class PaperSettings(PaperOptions):
         return self
 
     @property
-    def stretch(self) -> NDArray[np.float64]:
+    def stretch(self) -> FloatArray:
         """The measured stretches, evenly spaced."""
         return np.linspace(self.stretch_low, self.stretch_high, self.points)
 

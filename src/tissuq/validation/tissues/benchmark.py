@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from tissuq.assessment.uses import PRECISE, USEFUL, Verdict
@@ -47,7 +46,6 @@ __all__ = [
     "tasks_of",
 ]
 
-FloatArray = NDArray[np.float64]
 
 PROBABILITIES = (0.5, 0.8, 0.95)
 """Of the intervals whose coverage is counted; the last is that of half widths and scores."""
