@@ -18,8 +18,8 @@ from tissuq.registry import variants
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "arrays", "errors", "registry", "result_warning", "parameters", "drawing", "experiments", "mechanics", "model",
-    "inference", "prediction", "assessment", "next_test", "pictures", "posterior", "population", "export", "finite_elements",
-    "decks", "emulation", "studies", "validation", "report", "app", "cli", "__main__",
+    "inference", "prediction", "assessment", "next_test", "pictures", "posterior", "population", "export",
+    "finite_elements", "decks", "emulation", "studies", "validation", "report", "app", "cli", "__main__",
 ]  # fmt: skip
 
 
@@ -48,7 +48,7 @@ def test_the_page_of_the_architecture_lists_the_files_as_they_are():
     table = runpy.run_path(str(ROOT.parents[1] / "docs" / "architecture_table.py"))
     text = table["PAGE"].read_text(encoding="utf-8")
     assert table["stages_of"](text) == STAGES[4:-1]
-    assert table["page"](text, STAGES[3:-1]) == text, "run: make architecture"
+    assert table["page"](text, STAGES[4:-1]) == text, "run: make architecture"
 
 
 def test_the_statistics_of_the_data_know_nothing_of_the_rest():
