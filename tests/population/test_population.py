@@ -6,6 +6,7 @@ from functools import reduce
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from scipy.special import logsumexp
@@ -367,6 +368,16 @@ def test_errors_of_the_specimens_tests_are_no_spread_between_them(error):
     assert not found.complete.model.tolerances
 
 
+def test_the_specimens_may_stand_in_one_table(found):
+    table = pd.concat(
+        pd.DataFrame({"stretch": test.stretch, "stress (MPa)": test.stress, "specimen": name})
+        for name, test in specimens_of(MODULI).items()
+    )
+    pooled = neo_hookean(table)
+    assert list(pooled.posteriors) == list(found.posteriors)
+    assert pooled.summary().equals(found.summary())
+
+
 def test_few_specimens_are_warned_about(found):
     few = dict(list(found.posteriors.items())[:4])
     rest = found.complete, found.coordinates, found.hierarchy, found.spread_prior, found.seed
@@ -380,6 +391,8 @@ def test_few_specimens_are_warned_about(found):
         (lambda s: dict(list(s.items())[:2]), {}, "needs 3 specimens or more; there are 2 \\(s0, s1\\)"),
         (lambda s: list(s.values()), {}, "there are 1 \\(synthetic neo-hookean\\)"),
         (lambda s: [7, *s.values()], {}, "measurements are needed: a file"),
+        (lambda s: [], {}, "needs 3 specimens or more; there are 0"),
+        (lambda s: s, {"noise_sd": "3%"}, "noise '3%': '%' is not a unit of stress.*is 'proportional'"),
         (lambda s: s | {"empty": []}, {}, "there is no experiment to fit"),
         (lambda s: s, {"parameters": ["C01"]}, "must be a list of C10; found: C01"),
         (lambda s: s, {"parameters": "C10"}, "must be a list of C10"),

@@ -199,7 +199,10 @@ def noise_named(noise: Any) -> Noise:
     InputError
         When no noise has that name, or the number is not positive, or its unit is none of stress.
     """
-    noise = stress_in_mpa(noise)
+    try:
+        noise = stress_in_mpa(noise)
+    except InputError as error:
+        raise InputError(f"noise {noise!r}: {error} Noise in proportion to the stress is 'proportional'.") from error
     if isinstance(noise, Noise):
         return noise
     if isinstance(noise, (Sequence, np.ndarray)) and not isinstance(noise, str):

@@ -37,7 +37,7 @@ ALL_SPECIMENS = "all specimens"
 
 
 def fit_population(
-    experiments: Sequence[Any] | Mapping[str, Any],
+    experiments: Any,
     *,
     parameters: Sequence[str] | None = None,
     spread: float = 1.0,
@@ -61,8 +61,9 @@ def fit_population(
 
     Parameters
     ----------
-    experiments : sequence of Experiment, or mapping of str to Experiment or sequence of them
-        The tests of every specimen, in any loading modes; files and tables stand for what `tissuq.read` makes of them.
+    experiments : sequence of Experiment, mapping of str to Experiment or sequence of them, or one file or table of all
+        The tests of every specimen, in any loading modes; files and tables stand for what `tissuq.read_tests` makes of
+        them.
         In a sequence, experiments of the same specimen (of the same name, where no specimen is given) belong together.
         A specimen's tests in one mode are joined, so that they can determine the noise (``noise="repeats"``); those in
         several modes are fitted together.
@@ -173,13 +174,13 @@ def fit_population(
 
 
 def _by_specimen(
-    experiments: Sequence[Any] | Mapping[str, Any],
+    experiments: Any,
 ) -> dict[str, list[Experiment]]:
     """Return the tests of each specimen."""
     tests_of: dict[str, list[Experiment]] = {}
     if isinstance(experiments, Mapping):
         tests_of = {str(name): list(measurements(tests).tests) for name, tests in experiments.items()}
-    elif experiments:
+    elif not isinstance(experiments, Sequence) or experiments:
         for test in measurements(experiments).tests:
             tests_of.setdefault(test.specimen or test.name, []).append(test)
     if len(tests_of) < MIN_SPECIMENS:
