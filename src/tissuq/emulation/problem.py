@@ -17,6 +17,7 @@ from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.model.discrepancy import Discrepancy, GaussianProcess, NoDiscrepancy, PinnedProcess
 from tissuq.model.noise import NOISE_SD
+from tissuq.parameters.checks import check_priors
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, LogNormal, Normal, Prior
 
@@ -195,8 +196,7 @@ def pose(
     if set(noises) != set(columns):
         raise InputError(f"noise_sd is given for {', '.join(noises)}; what was measured is {', '.join(columns)}.")
     form = _discrepancy(discrepancy, zero_load)
-    if not isinstance(priors, Mapping):
-        raise InputError(f"priors must be by parameter, such as {{'C10': tissuq.Uniform(0, 5)}}, not {priors!r}.")
+    check_priors(priors)
     error_priors: dict[str, Prior] = {}
     for name, (controls, values) in columns.items():
         sd = noises[name]

@@ -1,12 +1,13 @@
-"""What numbers of many functions may be: seeds that every generator takes and every file holds, and probabilities."""
+"""What arguments of many functions may be: seeds that generators take and files hold, probabilities, priors."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from numbers import Integral
 
 from tissuq.errors import InputError
 
-__all__ = ["MAX_SEED", "check_probability", "check_seed"]
+__all__ = ["MAX_SEED", "check_priors", "check_probability", "check_seed"]
 
 MAX_SEED = 2**62
 
@@ -33,3 +34,15 @@ def check_probability(prob: float) -> None:
     """
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
+
+
+def check_priors(priors: object) -> None:
+    """Refuse priors that are not by parameter.
+
+    Raises
+    ------
+    InputError
+        When they are no mapping.
+    """
+    if not isinstance(priors, Mapping):
+        raise InputError(f"priors must be by parameter, such as {{'C10': tissuq.Uniform(0, 5)}}, not {priors!r}.")

@@ -17,7 +17,7 @@ from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import AS_TESTED, ESTIMANDS, Tolerances
-from tissuq.parameters.checks import check_seed
+from tissuq.parameters.checks import check_priors, check_seed
 from tissuq.parameters.priors import Prior
 from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
 from tissuq.posterior.posterior import Posterior
@@ -226,8 +226,8 @@ def _refuse_several(material: Any, priors: Any, mode: Any) -> None:
     """Refuse several laws, priors that are not by parameter, and modes of several tests in place of one."""
     if isinstance(material, str) and material == "all":
         raise InputError("one fit has one material: tissuq.fit_laws(data) fits all of them and compares them.")
-    if priors is not None and not isinstance(priors, Mapping):
-        raise InputError(f"priors must be by parameter, such as {{'C10': tissuq.Uniform(0, 5)}}, not {priors!r}.")
+    if priors is not None:
+        check_priors(priors)
     if isinstance(mode, (list, tuple)):
         raise InputError(
             "mode is one for all tests that are read: give each its own in [tissuq.read(table, mode='uniaxial'), "
