@@ -14,6 +14,7 @@ from tissuq.drawing.pieces import points
 from tissuq.drawing.style import BASE, inline_svg, relative_size
 from tissuq.experiments.branches import unloading
 from tissuq.experiments.modes import LoadingMode, Path
+from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["Curve", "draw_curves", "small_svg"]
@@ -84,8 +85,7 @@ class Curve:
 
     def drawn_at(self, points: FloatArray | None = None) -> FloatArray:
         """Return where on that axis the stress at points (g,) or (g, c) of the mode stands, or at those measured."""
-        points = self.points if points is None else points
-        return points if points.ndim == 1 else np.asarray(points[:, self.drawn_against])
+        return values_of_control(self.points if points is None else points, self.drawn_against)
 
     @property
     def is_back(self) -> BoolArray:

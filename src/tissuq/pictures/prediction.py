@@ -17,6 +17,7 @@ from tissuq.drawing.pieces import band, cut_off, line, outside, points
 from tissuq.drawing.style import BAND, BASE, INK, relative_size
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
 from tissuq.pictures.curves import Way, ways_of
@@ -134,14 +135,15 @@ def _predictions(solution: Solution, mode: LoadingMode, points: FloatArray, prob
         options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
         noisy, stress = predict_bands([(1.0, solution)], points, (True, False), **options)
         number = mode.drawn_against(channel, points)
+        abscissa = values_of_control(points, number)
         predictions.append(
             Predicted(
-                abscissa=points if points.ndim == 1 else points[:, number],
+                abscissa=abscissa,
                 stress=stress,
                 measurements=noisy,
                 is_calibrated=is_calibrated(model, mode, points, is_directed=is_directed),
                 calibrated=None if several else calibrated_range(model, mode, is_directed=is_directed),
-                ways=ways_of(mode, points, points if points.ndim == 1 else points[:, number]),
+                ways=ways_of(mode, points, abscissa),
                 measured=_measured(solution, mode, channel, number),
                 label=mode.controls[number].name,
                 title=mode.name if is_joint else f"{mode.name}\n{model.material.name} alone, discrepancy unknown",
@@ -253,4 +255,4 @@ def _measured(solution: Solution, mode: LoadingMode, channel: int, control: int)
     if not curves or not solution.is_of_data:
         return None
     points, stress = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("points", "stress"))
-    return Measured(points if points.ndim == 1 else points[:, control], stress, np.ones(len(stress), dtype=bool))
+    return Measured(values_of_control(points, control), stress, np.ones(len(stress), dtype=bool))

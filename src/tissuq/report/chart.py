@@ -14,6 +14,7 @@ from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.drawing.panels import limits_of
 from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
 from tissuq.pictures.curves import Described, held_along, is_determined, rows_where_held
@@ -56,7 +57,7 @@ class _Test(NamedTuple):
 
     @property
     def abscissa(self) -> FloatArray:
-        return self.points if self.points.ndim == 1 else self.points[:, self.control]
+        return values_of_control(self.points, self.control)
 
 
 class _Bands(NamedTuple):

@@ -17,6 +17,7 @@ from tissuq.drawing.panels import panels
 from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import ways_of
 from tissuq.pictures.prediction import Measured, Predicted, draw_predicted, predicted_limits
@@ -287,7 +288,7 @@ def draw_prediction(axes: Sequence[Axes], prediction: Prediction) -> None:
 def _shown(prediction: Prediction, channel: int, kind: bool) -> Predicted:
     """Return what is drawn of a stress, with the discrepancy or without."""
     number = prediction.mode.drawn_against(channel, prediction.points)
-    abscissa = list(prediction.controls.values())[number]
+    abscissa = values_of_control(prediction.points, number)
     measured = None
     if prediction.data is not None:
         points = prediction.data.stretch if prediction.points.ndim == 1 else abscissa

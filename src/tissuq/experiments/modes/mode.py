@@ -15,7 +15,10 @@ from tissuq.errors import ModelError
 from tissuq.experiments.modes.path import Deformation, Path, States
 from tissuq.registry import find, variants
 
-__all__ = ["SHEAR", "STRETCH", "AlongAxis2", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes"]
+__all__ = [
+    "SHEAR", "STRETCH", "AlongAxis2", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes",
+    "values_of_control",
+]  # fmt: skip
 
 WORDS_FOR_MODES = {
     "tension": "uniaxial",
@@ -41,9 +44,14 @@ class Control:
 
 
 STRETCH = Control("stretch")
+SHEAR = Control("amount of shear", reference=0.0, above=-inf)
 HELD = 0.1
 """Step of a control from one measurement to the next, over those of another one, below which it is held."""
-SHEAR = Control("amount of shear", reference=0.0, above=-inf)
+
+
+def values_of_control(points: FloatArray, number: int) -> FloatArray:
+    """Return the values (n,) of one control at points (n,) or (n, c)."""
+    return points if points.ndim == 1 else np.asarray(points[:, number])
 
 
 @dataclass(frozen=True)
@@ -134,11 +142,11 @@ class LoadingMode(ABC):
 
         That along whose axis it acts; where this one is held and another one changes, the latter.
         """
-        columns, probe = np.atleast_2d(np.transpose(points)), np.atleast_1d(self.excursion(0.1))
-        own = np.flatnonzero(probe == self.paths[channel].abscissa(self.excursion(0.1)))
+        columns, probe = np.atleast_2d(np.transpose(points)), self.excursion(0.1)
+        acting = np.flatnonzero(np.atleast_1d(probe) == self.paths[channel].abscissa(probe))
         steps = np.median(np.abs(np.diff(columns, axis=1)), axis=1) if columns.shape[1] > 1 else np.zeros(len(columns))
-        if len(own) and steps[own[0]] >= HELD * steps.max():
-            return int(own[0])
+        if len(acting) and steps[acting[0]] >= HELD * steps.max():
+            return int(acting[0])
         return int(np.argmax(steps))
 
     @property

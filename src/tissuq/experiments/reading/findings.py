@@ -320,10 +320,8 @@ def _many(reading: Reading, number: int) -> str:
 
 def _other_axis(reading: Reading, number: int) -> str:
     """Return a sentence about a biaxial test that is read as uniaxial."""
-    table = reading.table
-    choice = reading.choices[number]
+    table, choice, mode = reading.table, reading.choices[number], reading.experiment.mode
     axis, _ = on_axis(table.quantities[choice.deformation])
-    mode = reading.experiment.mode
     if not axis or not isinstance(mode.along_axis_1, Uniaxial) or test_beside(table, choice.stress, mode, {}):
         return ""
     names = enumerate(map(on_axis, table.quantities))
