@@ -11,6 +11,8 @@ from tissuq.prediction.bands import inside_band, predict_band
 from tissuq.prediction.densities import left_out_log_density
 
 COUNT = 20_000
+EVERY_ROW = {"tolerances": "as-tested"}
+"""Without errors of the test, measurements are not averaged."""
 
 
 def measured(seed: int = 1) -> tq.Experiment:
@@ -73,26 +75,26 @@ def test_one_pass_serves_the_model_with_discrepancy_and_the_one_without():
 )
 def test_posterior_is_that_of_all_rows(as_rows, material, discrepancy):
     data = measured()
-    few = tq.fit(data, material=material, discrepancy=discrepancy)
+    few = tq.fit(data, material=material, discrepancy=discrepancy, **EVERY_ROW)
     found = few.summary().to_numpy(), few.log_evidence
     as_rows()
-    every = tq.fit(data, material=material, discrepancy=discrepancy)
+    every = tq.fit(data, material=material, discrepancy=discrepancy, **EVERY_ROW)
     np.testing.assert_allclose(found[0], every.summary().to_numpy(), rtol=1e-8)
     assert found[1] == pytest.approx(every.log_evidence, abs=1e-6)
 
 
 def test_measurements_left_out_have_the_density_that_all_rows_give(as_rows):
-    solution = tq.fit(measured(), discrepancy="yeoh").solution
+    solution = tq.fit(measured(), discrepancy="yeoh", **EVERY_ROW).solution
     some = solution.mixture.thinned(4)
     found = left_out_log_density(solution.model, some)
     as_rows()
-    every = tq.fit(measured(), discrepancy="yeoh").solution
+    every = tq.fit(measured(), discrepancy="yeoh", **EVERY_ROW).solution
     np.testing.assert_allclose(found, left_out_log_density(every.model, some), atol=1e-7)
 
 
 @pytest.mark.slow
 def test_coverage_counts_measurements_inside_the_band_at_their_own_stretches():
-    solution = tq.fit(measured(), discrepancy="yeoh").solution
+    solution = tq.fit(measured(), discrepancy="yeoh", **EVERY_ROW).solution
     data = solution.model.experiment
     band = predict_band(solution, data.stretch, discrepancy=True)
     inside = ((band.low <= data.stress) & (data.stress <= band.high)).mean()
@@ -101,12 +103,14 @@ def test_coverage_counts_measurements_inside_the_band_at_their_own_stretches():
 
 
 def test_power_scaling_needs_no_thinning_of_condensed_measurements():
-    assert tq.fit(measured(), discrepancy="yeoh").assess().power_scaling is not None
+    assert tq.fit(measured(), discrepancy="yeoh", **EVERY_ROW).assess().power_scaling is not None
 
 
 @pytest.mark.slow
 def test_sampled_posterior_of_condensed_measurements_is_the_exact_one():
-    exact, sampled = (tq.fit(measured(), material="ogden-1", discrepancy="none", method=m) for m in ("exact", "nuts"))
+    exact, sampled = (
+        tq.fit(measured(), material="ogden-1", discrepancy="none", method=m, **EVERY_ROW) for m in ("exact", "nuts")
+    )
     sds = exact.summary()["sd"]
     away = (sampled.summary()["mean"] - exact.summary()["mean"]).abs() / sds
     assert (away < 0.25).all()  # about 1000 effective draws: 0.25 sd is eight standard errors

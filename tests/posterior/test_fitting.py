@@ -196,3 +196,45 @@ def test_the_largest_seed_is_sampled_and_saved(tmp_path):
 def test_what_is_of_several_fits_or_tests_says_where_it_belongs(options, words):
     with pytest.raises(tq.InputError, match=words):
         tq.fit({"stretch": [1.0, 1.1, 1.2], "stress [kPa]": [0.0, 1.0, 2.0]}, **options)
+
+
+LONG = np.linspace(1.0, 1.4, 24_000)
+
+
+def long_test(noise_sd=0.02, seed=0):
+    noise = np.random.default_rng(seed).normal(0, noise_sd, len(LONG))
+    return tq.Experiment("uniaxial", LONG, 0.5 * (LONG - LONG**-2) + noise)
+
+
+def test_a_long_file_has_the_errors_of_a_test_as_a_short_one_has():
+    data = long_test(noise_sd=0.003)
+    whole, few = (tq.fit(rows) for rows in (data, data.where(np.arange(0, len(LONG), 300))))
+    assert (whole.model.tolerances, few.model.tolerances) == (tq.Tolerances("specimen"),) * 2
+    assert whole.model.experiment.rows_name == "means of 12 measurements"
+    (mean, sd), (few_mean, few_sd) = (fit.summary().loc["C10", ["mean", "sd"]] for fit in (whole, few))
+    assert sd > 0.05 * mean
+    assert sd == pytest.approx(few_sd, rel=0.15)
+    assert abs(mean - few_mean) < 0.3 * sd
+
+
+def test_means_of_measurements_tell_what_all_of_them_do():
+    every = tq.fit(long_test(), noise_sd=0.02, discrepancy="none").summary().loc["C10"]
+    means = tq.fit(long_test(), tolerances=tq.Tolerances(slack=1e-7), discrepancy="none").summary()
+    assert means.loc["C10", "mean"] == pytest.approx(every["mean"], abs=0.05 * every["sd"])
+    assert means.loc["C10", "sd"] == pytest.approx(every["sd"], rel=0.05)
+    assert means.loc["noise_sd", "mean"] == pytest.approx(0.02 / np.sqrt(12), rel=0.05)
+
+
+def test_measurements_of_known_noise_or_without_errors_of_the_test_are_not_averaged():
+    stretch, sign = np.repeat(LONG[::10], 2), (-1) ** np.arange(4_800)
+    data = tq.Experiment("uniaxial", stretch, stretch - 1 + 1e-3 * sign)
+    for options in ({"noise_sd": 0.02}, {"tolerances": "as-tested"}, {"noise": "repeats"}):
+        assert tq.fit(data, discrepancy="none", **options).model.experiment is data
+
+
+def test_a_saved_fit_of_means_says_so(tmp_path):
+    posterior = tq.fit(long_test(), discrepancy="none")
+    posterior.save(tmp_path / "fit.nc")
+    loaded = tq.Posterior.load(tmp_path / "fit.nc")
+    assert loaded.model.experiment.rows_name == "means of 12 measurements"
+    assert "2000 means of 12 measurements" in repr(loaded)

@@ -82,7 +82,7 @@ def uses_of(
 ) -> tuple[Use, ...]:
     """Return for what a posterior with this initial shear modulus can be used; the others as in `answer_of`."""
     codes = {w.code for w in warnings if w.code != "measurements" or w.severity is not Severity.NOTE}
-    counts = f"{inside.sum()} of {len(inside)} measurements inside the band"
+    counts = f"{inside.sum()} of {len(inside)} {solution.model.experiment.rows_name} inside the band"
     missed = f"only {counts}" if inside.sum() < MIN_INSIDE * len(inside) else ""
     own_tests = _own_tests(solution, codes, counts, missed)
     other_modes = _other_modes(solution, ranges, codes, own_tests, missed)

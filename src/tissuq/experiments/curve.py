@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from tissuq.arrays import BoolArray, FloatArray
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.drawing.panels import Panels, shortened, small_panels
 from tissuq.drawing.pieces import points
 from tissuq.drawing.style import BASE, inline_svg, relative_size
@@ -20,6 +20,10 @@ from tissuq.experiments.units import stress_unit
 __all__ = ["Curve", "draw_curves", "small_svg"]
 
 
+MAX_WIDTH_OF_MEANS = 0.05
+"""Of a control over its range, within half of the groups of measurements that are averaged, and between two."""
+MAX_GROUPS_FACTOR = 2
+"""Groups over those of measurements without jumps, beyond which measurements are not in order."""
 MOST_SMALL = 2
 """Curves of a notebook's figure at the most."""
 
@@ -45,6 +49,8 @@ class Curve:
     least_errors : mapping of str to float
     direction, condition : str
         Those of the test.
+    averaged : int
+        Consecutive measurements, at most, of which each row is the mean; 1 where rows are single measurements.
     """
 
     mode: LoadingMode
@@ -59,6 +65,7 @@ class Curve:
     least_errors: Mapping[str, float] = field(default_factory=dict)
     direction: str = ""
     condition: str = ""
+    averaged: int = 1
 
     def __len__(self) -> int:
         return len(self.stress)
@@ -96,6 +103,45 @@ class Curve:
     def quantity(self) -> str:
         """What the mode calls the stress."""
         return self.mode.stresses[self.channel]
+
+    def of_means(self, rows: int) -> Curve:
+        """Return the curve as so many rows, about: means of consecutive measurements, or of neighbours along it.
+
+        Neighbours where consecutive measurements lie far apart, as repeated or shuffled ones do. Where these have
+        several controls, and neighbours in one of them differ in others, all measurements are left.
+        """
+        count = -(-len(self) // rows)
+        if count == 1:
+            return self
+        controls = self.points.reshape(len(self), -1)
+        order = np.arange(len(self))
+        starts, width = _groups(controls, count)
+        if width > MAX_WIDTH_OF_MEANS:
+            order = np.lexsort(controls.T)
+            starts, width = _groups(controls[order], count)
+        if width > MAX_WIDTH_OF_MEANS:
+            return self
+        sizes = np.diff(np.append(starts, len(self)))
+        points, stress, error = (
+            (np.add.reduceat(values[order], starts, axis=0).T / sizes).T
+            for values in (self.points, self.stress, self.standard_error)
+        )
+        return replace(self, points=points, stress=stress, standard_error=error, averaged=self.averaged * count)
+
+
+def _groups(controls: FloatArray, count: int) -> tuple[IndexArray, float]:
+    """Return where groups of so many rows (n, c) begin, anew at every jump, and how wide half of them are at the most.
+
+    Jumps and widths are of the controls over their ranges, for these the largest of all controls.
+    """
+    shares = controls / np.where(np.ptp(controls, axis=0) > 0, np.ptp(controls, axis=0), 1.0)
+    is_jump = np.append(True, (np.abs(np.diff(shares, axis=0)) > MAX_WIDTH_OF_MEANS).any(axis=1))
+    rows = np.arange(len(controls))
+    starts = np.flatnonzero((rows - np.maximum.accumulate(np.where(is_jump, rows, 0))) % count == 0)
+    if len(starts) > MAX_GROUPS_FACTOR * len(controls) / count:
+        return starts, np.inf
+    widths = np.maximum.reduceat(shares, starts) - np.minimum.reduceat(shares, starts)
+    return starts, float(np.median(widths.max(axis=1)))
 
 
 def draw_curves(drawn: Panels, curves: Sequence[Curve], unit_name: str) -> None:

@@ -24,6 +24,10 @@ from tissuq.experiments.units import stress_unit as stress_unit_of
 __all__ = ["Experiment"]
 
 
+MIN_ROWS = 200
+"""Rows that a curve keeps at least where consecutive measurements are averaged."""
+
+
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Experiment:
     """Measurements of one test: what it set, such as stretches, and the stresses. `Experiment.of` joins several tests.
@@ -331,9 +335,9 @@ class Experiment:
         curves = (number for number, curve in enumerate(self.curves) if (curve.mode, curve.channel) == (mode, channel))
         return mode.paths[channel].at(points, next(curves, UNMEASURED))
 
-    def labelled(self, **labels: str) -> Experiment:
-        """Return the same measurements with another name, source, specimen, direction or condition, or unit to read."""
-        return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
+    def labelled(self, **labels: str | int) -> Experiment:
+        """Return the same measurements with other labels of `Curve`, such as name, source, unit to read or specimen."""
+        return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # by name
 
     def where(self, selected: NDArray[Any]) -> Experiment:
         """Return only some measurements of a test: a mask (n,), or numbers of its rows."""
@@ -342,6 +346,34 @@ class Experiment:
             replace(curve, **{name: getattr(curve, name)[selected] for name in columns}) for curve in self._only_test
         )
         return self._of_curves(curves)
+
+    def averaged(self, size: int) -> Experiment:
+        """Return about so many stresses at most: means of consecutive measurements where there are more.
+
+        Parameters
+        ----------
+        size : int
+            Of all curves together, which share it equally; none is left with fewer rows than `MIN_ROWS`.
+
+        Examples
+        --------
+        >>> import numpy as np, tissuq as tq
+        >>> stretch = np.linspace(1, 1.5, 90_000)
+        >>> data = tq.Experiment("uniaxial", stretch, stretch - stretch**-2)
+        >>> data.averaged(2000), data.averaged(2000).rows_name
+        (<Experiment 'experiment': uniaxial, 2000 measured stresses in MPa>, 'means of 45 measurements')
+        """
+        if self.size <= size:
+            return self
+        rows = max(size // len(self.curves), MIN_ROWS)
+        return self._of_curves(curve.of_means(rows) for curve in self.curves)
+
+    @property
+    def rows_name(self) -> str:
+        """What its rows are, in words: measurements, or means of some."""
+        most = max(curve.averaged for curve in self.curves)
+        several = "up to " * (len({curve.averaged for curve in self.curves}) > 1)
+        return f"means of {several}{most} measurements" if most > 1 else "measurements"
 
     def has_measurements_of(self, experiment: Experiment) -> bool:
         """Return whether another experiment has the same curves, be it read in another unit."""

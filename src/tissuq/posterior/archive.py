@@ -68,7 +68,11 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
                 "stress": (("point", "stress_of_mode")[: test.stress.ndim], test.stress, {"units": "MPa"}),
             }
             | _standard_error_of(test),
-            attrs={"mode": test.mode.name, "least_errors": json.dumps(test.least_errors)}
+            attrs={
+                "mode": test.mode.name,
+                "least_errors": json.dumps(test.least_errors),
+                "averaged": test.curves[0].averaged,
+            }
             | {label: getattr(test, label) for label in LABELS},
         )
     return groups
@@ -129,12 +133,13 @@ def _standard_error_of(test: Experiment) -> dict[str, Any]:
 
 def _test(group: Group) -> Experiment:
     labels = {label: str(group.attrs.get(label, "")) for label in LABELS}
+    averaged = int(group.attrs.get("averaged", 1))
     stretch, stress = group.arrays["stretch"], group.arrays["stress"]
     errors = {
         "standard_error": group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T,
         "least_errors": json.loads(group.attrs.get("least_errors", "{}")),
     }
-    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(**labels)
+    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(averaged=averaged, **labels)
 
 
 def _plain_noise(noise: Noise) -> str | float | list[float]:

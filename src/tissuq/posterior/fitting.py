@@ -27,6 +27,9 @@ __all__ = ["fit", "fit_many"]
 
 OPTIONS = ("discrepancy", "material", "noise_sd", "noise", "priors", "tolerances", "method", "stable_in", "seed")
 """Of a fit, beside those of reading."""
+MAX_SIZE = 2000
+"""Stresses that are fitted one by one; of more, means of consecutive ones: errors of whole tests and the correlation of
+consecutive errors cost more with every one, and more than that many tell no more about a smooth curve."""
 
 
 def fit(
@@ -50,7 +53,9 @@ def fit(
     data : Experiment, str, path or table, or sequence of these
         The measurements: of one test, or of several in any modes, which share one material. A discrepancy that is an
         energy acts in all of them; one in stress is another in each test, of the same size. Files and tables (of
-        pandas, polars, xarray) are read as by `tissuq.read`.
+        pandas, polars, xarray) are read as by `tissuq.read`. Of more than 2000 stresses, with unknown noise, means of
+        consecutive ones are fitted (`Experiment.averaged`): noise is then that of means. With the noise known, or
+        tolerances that are none, every measurement is.
     discrepancy : str or Discrepancy
         What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object; ``"auto"`` is
         an average of strain energies that leave the initial shear modulus alone, by the evidence.
@@ -198,7 +203,11 @@ def fit_many(
     options = material_named(material), discrepancy_named(discrepancy), noise_model, dict(priors or {})
     solver = Solver(method, modes_named(stable_in), int(seed))
 
+    is_averaged = bool(noise_model.parameters) and not noise_model.shares_discrepancy
+    is_averaged = is_averaged and (tolerances is None or bool(tolerances))
+
     def model_of(data: Experiment) -> StatisticalModel:
+        data = data.averaged(MAX_SIZE) if is_averaged else data
         stated = tolerances.at_least(data.least_errors) if tolerances else tolerances or Tolerances()
         model = StatisticalModel(data, *options, stated)
         standard = default_tolerances(model).replaced_by(replacing) if tolerances is None else stated

@@ -18,7 +18,6 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.measurement_errors import MeanError, ScaleError, TestError
 from tissuq.model.noise import AutoregressiveNoise, UnknownNoise
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.model.statistics import CHUNK
 from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
@@ -297,8 +296,8 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
     """Return the tolerances of a model for which the user gives none.
 
     Those of the specimen, or where tests are of several, of the tissue. None where something else takes up errors of
-    the test (a discrepancy with errors of its own, noise that is more than one number), of one test with known noise,
-    and of very many measurements. Errors that the measurements themselves show are included at least as large.
+    the test (a discrepancy with errors of its own, noise that is more than one number), and of one test with known
+    noise. Errors that the measurements themselves show are included at least as large.
     """
     if model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy:
         return Tolerances()
@@ -306,8 +305,8 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
     takes_up_errors = model.noise.is_consecutive or discrepancy.is_scattered or not discrepancy.is_energy
     if specimens_of(model.experiment).shape[1] > 1:
         return (BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)).at_least(model.experiment.least_errors)
-    is_told = len(model.experiment.tests) == 1 and (not model.noise.parameters or model.experiment.size > CHUNK)
-    tolerances = Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
+    is_known = len(model.experiment.tests) == 1 and not model.noise.parameters
+    tolerances = Tolerances() if is_known or takes_up_errors else Tolerances(SPECIMEN)
     return tolerances.at_least(model.experiment.least_errors)
 
 

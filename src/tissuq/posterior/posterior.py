@@ -554,7 +554,7 @@ class Posterior(PosteriorPlots):
         model = self.model
         return (
             f"<Posterior of {', '.join(model.symbols)}: {model.material.name}, discrepancy {model.discrepancy.name}, "
-            f"{model.experiment.size} measurements, {self.solution.route}>"
+            f"{model.experiment.size} {model.experiment.rows_name}, {self.solution.route}>"
         )
 
     def _repr_html_(self) -> str:

@@ -69,7 +69,7 @@ def tests_in_words(experiment: Experiment) -> list[str]:
         control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
         specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
         ends = f"{values.min():.4g} to {values.max():.4g}"
-        texts.append(f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}")
+        texts.append(f"{test.mode.name} test{specimen_words}, {len(test)} {test.rows_name}, {control} {ends}")
     return texts
 
 

@@ -100,7 +100,7 @@ def prediction_result(
     if prediction.scores is not None and prediction.data is not None:
         tables.append(score_table(prediction, prediction.scores, prediction.data.name))
     model = prediction.posterior.model
-    measured = " and ".join(f"{test.mode.name} ({len(test)} measurements)" for test in model.experiment.tests)
+    measured = " and ".join(f"{test.mode.name} ({len(test)} {test.rows_name})" for test in model.experiment.tests)
     run = Path(settings.run).name or settings.run
     return Result(
         command=f"predict{f' --user-law {law}' if law else ''}",

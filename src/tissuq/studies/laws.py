@@ -143,7 +143,8 @@ def run_laws(
             pool=pool,
             **shared_options(settings, unit),
         )
-    return LawStudy(settings, experiment, comparison, warnings_of_files(readings))
+    fitted_experiment = next(iter(comparison.fits.values())).model.experiment
+    return LawStudy(settings, fitted_experiment, comparison, warnings_of_files(readings))
 
 
 @contextmanager

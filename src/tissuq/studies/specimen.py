@@ -161,7 +161,7 @@ def run_specimen(
     if not posteriors:
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
-    read_warnings = warnings_of_files(readings)
+    read_warnings, experiment = warnings_of_files(readings), next(iter(posteriors.values())).model.experiment
     early(SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {}, read_warnings))
     step("assessing")
     assessments = {
