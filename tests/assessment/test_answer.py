@@ -51,6 +51,7 @@ def test_a_material_that_is_allowed_to_be_wrong_serves_where_one_mode_was_measur
     modulus = posterior.answer.estimates[0]
     assert (modulus.high - modulus.low) / 2 / modulus.mean < PRECISE
     assert verdicts(posterior)[:3] == [Verdict.YES, Verdict.YES, Verdict.CARE]
+    assert posterior.answer.uses[0].reason.endswith(", errors of the test not included")
     assert "only one mode was measured" in posterior.answer.uses[2].reason
     assert posterior.answer.next_step.shell.endswith("tissuq design {run} says which helps most.")
 
@@ -290,7 +291,14 @@ def test_a_law_that_does_not_describe_the_measurements_is_said_to_be_wrong_with_
     assert gallery.fit(right, discrepancy="auto", noise_sd=0.01).answer.law == ""
 
 
-@pytest.mark.parametrize(("ends", "words"), [((-0.3, 0.3), "± 30 %"), ((-0.34, 0.52), "within −34 % and +52 %")])
+@pytest.mark.parametrize(
+    ("ends", "words"),
+    [
+        ((-0.3, 0.3), "± 30 %"),
+        ((-0.34, 0.52), "within −34 % and +52 %"),
+        ((-0.011, 0.0008), "within −1.1 % and +0.1 %"),
+    ],
+)
 def test_both_ends_of_a_skew_interval_are_said(ends, words):
     assert _ends_in_words(*ends) == words
 

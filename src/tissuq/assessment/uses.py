@@ -16,7 +16,7 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.curve import Curve
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
-from tissuq.model.tolerances import TISSUE
+from tissuq.model.tolerances import AS_TESTED, TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity, symbols_in
 
@@ -149,7 +149,7 @@ def _reporting(
         spread = SPREAD + unnamed * (not all(test.specimen for test in model.experiment.tests))
         common = spread if model.tolerances.estimand == TISSUE else error
         return verdict, f"{width}, nearly all of it the {common}"
-    return verdict, width
+    return verdict, width + ", errors of the test not included" * (model.tolerances.estimand == AS_TESTED)
 
 
 def precision_of(half_width: float) -> tuple[Verdict, str]:
@@ -161,14 +161,19 @@ def precision_of(half_width: float) -> tuple[Verdict, str]:
 def _percent(half_width: float) -> str:
     if not half_width <= 1:
         return "no better than ± 100 %" if half_width <= UNKNOWN else "not known at all"
-    return f"± {100 * half_width:.0f} %" if half_width >= 0.1 else f"± {max(100 * half_width, 0.1):.2g} %"
+    return f"± {_number(100 * half_width)} %"
+
+
+def _number(percentage: float) -> str:
+    return f"{percentage:.0f}" if percentage >= 10 else f"{max(percentage, 0.1):.2g}"
 
 
 def _ends_in_words(low: float, high: float) -> str:
     """Return the ends of an interval from the mean, over the mean: as one number where they are about the same."""
     if max(-low, high) <= SKEW * min(-low, high):
         return _percent((high - low) / 2)
-    return f"within {100 * low:.0f} % and +{100 * high:.0f} %".replace("-", "−")
+    low_end, high_end = (_number(100 * abs(end)) for end in (low, high))
+    return f"within −{low_end} % and +{high_end} %"
 
 
 def worst_of(*verdicts: Verdict) -> Verdict:
