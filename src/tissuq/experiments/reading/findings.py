@@ -29,8 +29,6 @@ from tissuq.result_warning import ResultWarning, Severity
 
 __all__ = ["data_warnings"]
 
-MANY_ROWS = 10_000
-"""Rows from which thinning is worth a word."""
 MIN_ROWS_PER_CYCLE = 10
 """Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
 NOTABLE_SHARE = 0.05
@@ -311,13 +309,6 @@ def _stretched_tube(reading: Reading, number: int) -> str:
     return "" if axial is None else note_of_stretched_tube(axial, load)
 
 
-def _many(reading: Reading, number: int) -> str:
-    count = len(reading.used)
-    if count < MANY_ROWS:
-        return ""
-    return f"all {count} rows would be fitted; --every {count // 1000} would leave about a thousand."
-
-
 def _other_axis(reading: Reading, number: int) -> str:
     """Return a sentence about a biaxial test that is read as uniaxial."""
     table, choice, mode = reading.table, reading.choices[number], reading.experiment.mode
@@ -396,5 +387,4 @@ CHECKS: Mapping[Callable[[Reading, int], str], tuple[str, Severity]] = {
     _reference: NOTE,
     _diameter: CAUTION,
     _stretched_tube: NOTE,
-    _many: NOTE,
 }
