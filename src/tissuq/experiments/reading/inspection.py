@@ -11,7 +11,7 @@ import numpy as np
 from tissuq.experiments.numbers import wrapped
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.axial_stretch import stretches_held
-from tissuq.experiments.reading.columns_of_tube import is_of_length
+from tissuq.experiments.reading.columns_of_tube import is_axial_displacement, is_of_length
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
@@ -146,7 +146,8 @@ class Inspection:
                     _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
                 )
         if (column := self.reading.axial_column) is not None:
-            roles[column] = "length of the tube" if is_of_length(table, column) else "axial stretch"
+            what = "axial displacement" if is_axial_displacement(table, column) else "length"
+            roles[column] = f"{what} of the tube" if is_of_length(table, column) else "axial stretch"
         for column in range(len(table.names)):
             if self.reading.mode_source == f"column {table.label(column)}":
                 roles[column] = "loading mode"
