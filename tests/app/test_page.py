@@ -233,6 +233,33 @@ def test_from_a_file_to_the_answer_and_all_that_follows(visit, tmp_path, write_s
 
 
 @pytest.mark.slow
+def test_what_to_do_next_names_the_controls_of_the_page(visit, tmp_path, write_stretches):
+    page = visit()
+    upload(page, *[write_stretches(tmp_path, f"{c10}.csv", c10=c10) for c10 in (5.0, 6.0)])
+    fit(page, until="#answer-body .numbers")
+    advice = page.inner_text("#answer-body")
+    assert "fit again with “All tests are of one specimen”" in advice
+    assert "--" not in advice
+    page.click("#fit-form summary")
+    page.check("#one-specimen")
+    page.wait_for_selector("#stale", state="visible")
+    fit(page, until="text=for this specimen")
+    written = page.evaluate("""async texts => { const { onPage } = await import(new URL("dom.js", document.baseURI));
+        return texts.map(onPage); }""", [
+        "fit again with --discrepancy auto.", "fit again with --stable-in all.", "fit again with --until-peak.",
+        "count from where load begins: fit again with --preload auto.", "fit again with --material all.",
+        "tissuq design runs/a says which.", "or with --noise autoregressive.",
+    ])  # fmt: skip
+    assert written == [
+        "fit again with “What the material cannot explain”: auto.",
+        "fit again with “Only materials that are stable in all loading modes”.",
+        "fit again with “Leave out what follows the largest stress”.",
+        "count from where load begins: fit again with “Taut (stretch 1) from”: auto.",
+        "fit again with “Compare laws”, below.", "tissuq design runs/a says which.", "or with --noise autoregressive.",
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
 def test_a_bad_file_shows_one_message_and_goes_when_it_is_removed(visit, tmp_path, write_stretches):
     page = visit()
     (tmp_path / "bad.csv").write_text("hello,world\nfoo,bar\n")

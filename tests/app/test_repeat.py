@@ -124,6 +124,16 @@ def test_a_fit_of_several_files_is_repeated(here, write_stretches, monkeypatch):
 
 
 @pytest.mark.slow
+def test_a_fit_of_tests_that_are_said_to_be_of_one_specimen_is_repeated(here, write_stretches, monkeypatch):
+    write_stretches(here, "a.csv")
+    write_stretches(here, "b.csv", c10=6.0)
+    request = {"files": ["a.csv", "b.csv"], "modes": ["uniaxial"], "discrepancies": ["none"], "is_one_specimen": True}
+    said = done("fit", request)
+    assert "for this specimen" in said["answer"]["finding"]
+    check_repeats(said, monkeypatch)
+
+
+@pytest.mark.slow
 def test_strips_along_both_axes_of_a_tissue_are_repeated(here, write_stretches, monkeypatch):
     write_stretches(here, "circumferential.csv")
     write_stretches(here, "axial.csv", c10=3.0)

@@ -47,6 +47,7 @@ def test_a_run_becomes_the_cards_of_its_posterior(cli, here, run):
     typical = min(rows, key=lambda row: float(row["from_median"]))["file"]
     assert f"median stresses: {typical}\n" in said.out
     text = (here / "cards" / "specimen-calculix" / "draw-2.inp").read_text()
+    assert "calibrated stretches: uniaxial" in " ".join(said.out.split())
     assert "run specimen of tissuq, sobol draws from seed 3" in " ".join(text.split())
 
 

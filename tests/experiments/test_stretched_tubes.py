@@ -301,3 +301,20 @@ def test_an_angle_that_the_hoop_stress_does_not_tell_beside_a_discrepancy_is_ref
     file = written_with_column(tmp_path, [1.2, 1.5], fibres)
     with pytest.raises(ModelError, match=r"fibres across carry none of the stress that was measured.*fibres@45"):
         tq.fit(file, material="holzapfel-gasser-ogden", discrepancy="auto", **SIZES)
+
+
+@pytest.mark.parametrize("law", ISOTROPIC)
+def test_the_note_says_how_thick_a_wall_is_undeformed_that_was_measured_stretched(tmp_path, law):
+    """A wall that keeps its volume, at the diameter that it has without pressure, by the roots of the other file."""
+    axial, inner, outer = 1.5, 1.0, 1.2
+    stretch, loads = inflation(law, axial, inner, outer)
+    added = inner * outer * (axial * stretch**2 - 1)
+    faces = [np.sqrt((radius**2 + added) / axial) for radius in (inner, outer)]
+    rows = "".join(f"{1e3 * p:.8g},{2 * b:.8g}\n" for p, b in zip(loads, faces[1], strict=True))
+    (tmp_path / "artery.csv").write_text(f"pressure [kPa],outer diameter [mm]\n{rows}", encoding="utf-8")
+    seen = tq.inspect(
+        tmp_path / "artery.csv", mode="inflated-tube", axial_stretch=axial, diameter="2.4 mm", thickness="0.2 mm"
+    )
+    (note,) = [text for text in seen.warnings if "times as thick undeformed" in text]
+    said = float(note.split("is about ")[1].split(" times")[0])
+    assert said == pytest.approx(0.2 / (faces[1] - faces[0])[0], rel=0.03)

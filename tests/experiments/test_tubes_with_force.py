@@ -153,6 +153,19 @@ def test_the_undeformed_length_may_stand_above_the_table(tmp_path):
     assert "/ 8 mm (length in line 1)" in data.source
 
 
+@pytest.mark.parametrize(
+    ("name", "column"), [("Axial displacement (mm)", {}), ("Displacement (mm)", {"columns": {"axial_stretch": 3}})]
+)
+def test_an_axial_displacement_tells_the_axial_stretch_with_the_undeformed_length(tmp_path, name, column):
+    rows = rows_of(fibres)
+    rows[:, 2] = 8 * (rows[:, 2] - 1)
+    file = written(tmp_path, rows, f"Pressure (mmHg),Diameter (um),{name},Force (mN)")
+    data = tq.read(file, **SIZES, **column, length="8 mm")
+    np.testing.assert_allclose(data.stretch[:, 1], measured(fibres)[1], rtol=1e-8)
+    with pytest.raises(InputError, match='--length "8 mm"'):
+        tq.read(file, **SIZES, columns={"axial_stretch": 3})
+
+
 @pytest.mark.parametrize("held", [{"axial_stretch": 1.4}, {"length": "8 mm"}])
 def test_the_axial_stretch_of_all_rows_may_be_given(tmp_path, held):
     """As a number, or as a length that is the same in all rows beside the undeformed one."""

@@ -183,7 +183,7 @@ def test_a_thin_tube_is_read_from_columns_given_for_both_stresses(tmp_path):
         (AXES, {"mode": "constrained-uniaxial", "columns": {"stretch2": 4, "stress2": 3}}, "cannot be given as 'str"),
         ("a,b,stretch,stress", {}, "name them 'stretch x', 'stress x', 'stretch y', 'stress y'"),
         ("stretch,b,stress,d", {"columns": {"stress2": "d"}}, "the file's columns do not tell both. The columns are"),
-        ("disp x [mm],disp y [mm],stress x,stress y", {}, "give the undeformed length: length '20 mm'"),
+        ("disp x [mm],disp y [mm],stress x,stress y", {}, 'give the undeformed length (--length "20 mm"'),
         (
             "disp x [mm],disp y [mm],stress x,stress y",
             {"dimensions": {"length": "2 mm"}},

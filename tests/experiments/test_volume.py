@@ -41,7 +41,7 @@ def test_a_volume_that_changes_is_refused_with_its_ratio(form, ratio):
     assert abs(float(said.split("Poisson's ratio ")[1].split(" ")[0]) - ratio) < 0.012
     change = float(said.split("it changes by ")[1].split("%")[0])
     assert change == pytest.approx(100 * (1.3 ** (1 - 2 * ratio) - 1), abs=1.2)
-    assert "give --incompressible." in said
+    assert "give incompressible=True." in said
     taken = tq.read(_table(ratio, form), incompressible=True)
     assert "taken as incompressible, though Poisson's ratio" in taken.source
     assert taken.has_measurements_of(tq.read(_table(ratio, form).drop(columns=form)))

@@ -5,8 +5,9 @@ import pytest
 import tissuq as tq
 from tissuq.drawing.panels import panels
 from tissuq.experiments.units import stress_unit
+from tissuq.population.answer import headline
 from tissuq.population.picture import draw_specimens
-from tissuq.report.population_figures import headline, headline_figure
+from tissuq.report.population_figures import headline_figure
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,11 @@ from scipy.stats import norm, truncnorm
 
 import tissuq as tq
 from tissuq.assessment.uses import COMPUTING, Use, Verdict
+from tissuq.population import answer
+from tissuq.population.answer import use_of_law_alone
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
-from tissuq.report import population_in_words
-from tissuq.report.population_in_words import next_step_of, use_of_law_alone
+from tissuq.report.population_in_words import next_step_of
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
@@ -501,25 +502,23 @@ def test_what_leaves_the_discrepancy_out_serves_where_that_carries_little():
 
 def test_the_modulus_of_a_law_that_is_wrong_is_that_at_rest_where_the_law_carries_it(monkeypatch):
     def said(initial, share=0.9, words="initial shear modulus"):
-        monkeypatch.setattr(population_in_words, "share_of_initial_stiffness", lambda _: initial)
-        return population_in_words.about_modulus(None, share, words)
+        monkeypatch.setattr(answer, "share_of_initial_stiffness", lambda _: initial)
+        return answer.about_modulus(None, share, words)
 
     assert said(0.03) == " The modulus is that at rest, of which the discrepancy carries 3 %."
     assert said(0.03, share=0.1) == said(0.03, words="C10") == said(0.3) == said(float("nan")) == ""
 
 
 def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_that_is_known(monkeypatch):
-    monkeypatch.setattr(population_in_words, "has_energy", lambda model: True)
-    monkeypatch.setattr(population_in_words, "shares_of_discrepancy", lambda share: (share, None))
+    monkeypatch.setattr(answer, "has_energy", lambda model: True)
+    monkeypatch.setattr(answer, "shares_of_discrepancy", lambda share: (share, None))
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
 
     def said(shares, warnings=(), **which):
         fits = {name: SimpleNamespace(solution=Share(share)) for name, share in zip("abc", shares, strict=True)}
         law = SimpleNamespace(model=SimpleNamespace(material=SimpleNamespace(name="demiray")))
         pooled = SimpleNamespace(posteriors=fits, complete=law)
-        return population_in_words.about_law(
-            pooled, population_in_words.share_of_discrepancy(pooled, warnings, **which)
-        )
+        return answer.about_law(pooled, answer.share_of_discrepancy(pooled, warnings, **which))
 
     class Share(tuple):
         model = None

@@ -138,3 +138,22 @@ def test_few_specimens_say_little_of_a_new_one_and_one_in_another_unit_of_none()
     uses = uses_of_population(population([*MODULI[:3], 500.0]), [band(0.1)], ())
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
     assert "s3 differs from the others as much as by a mistaken unit" in uses[0].reason
+
+
+def test_the_answer_in_python_has_the_numbers_of_the_summary_and_the_uses_of_the_page(alike):
+    answer = alike.answer
+    new, median, spread = answer.estimates
+    table = alike.summary(unit="MPa")
+    for estimate, quantity in ((new, "new patient"), (median, "median")):
+        expected = [2 * table.loc[("C10", quantity), end] for end in ("median", "hdi_low", "hdi_high")]  # mu = 2 C10
+        assert estimate[1:4] == pytest.approx(expected, rel=1e-9)
+        assert estimate.unit == "MPa"
+    assert spread[1:4] == pytest.approx(np.exp(table.loc[("C10", "spread")].to_numpy(float)), rel=1e-9)
+    assert [use.purpose for use in answer.uses] == [
+        "report the modulus of the tissue", "predict a new specimen", "compute with a new specimen",
+    ]  # fmt: skip
+    bands = alike.new_patient(np.linspace(0.8, 1.3, 41), unit="MPa")
+    width = Band(*(bands[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
+    assert answer.uses[:2] == uses_of_population(alike, [width], alike.warnings)
+    assert "modulus of a new specimen" in str(answer)
+    assert "WITH CARE: report the modulus of the tissue: " in str(answer)

@@ -19,6 +19,8 @@ __all__ = ["TASKS", "Say", "warm_up"]
 Say = Callable[[str, Any], None]
 """Is told what has come of a task so far: the kind of news, and plain data."""
 RUNS, CARDS = Path("runs"), Path("cards")
+SPECIMEN = "specimen"
+"""What the only specimen of several tests is called."""
 
 
 def choices(_: Mapping[str, Any], say: Say) -> None:
@@ -74,7 +76,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
     values, readings, name = _measured(request)
     options = _options(request, ("material", "discrepancies", "noise_sd", "estimand", "stable_in"))
     settings = _settings(SpecimenSettings, values | options)
-    shell = _shell("fit", *_files(request), options)
+    shell = _shell("fit", *_files(request), {"specimen": _specimens(request)} | options)
 
     def say_answer(study: SpecimenStudy) -> None:
         record = specimen_answer(study).record()
@@ -115,7 +117,9 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     say("step", "writing the report")
     with run_folder(RUNS / folder_name, "fit", force=True) as folder:
         write_result(law_result(study, _sources(settings)), folder, target=RUNS / folder_name)
-    shell = _shell("fit", *_files(request), options | {"out": f"runs/{folder_name}"})
+    shell = _shell(
+        "fit", *_files(request), {"specimen": _specimens(request)} | options | {"out": f"runs/{folder_name}"}
+    )
     table = law_table(study)
     say(
         "done",
@@ -170,6 +174,7 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
 def export(request: Mapping[str, Any], say: Say) -> None:
     """Write draws of a run as material cards; say the files and what they are."""
     from tissuq.export import CardSettings
+    from tissuq.export.cards import calibrated_stretches
     from tissuq.report.cards import write_cards
     from tissuq.report.source_run import said_by
     from tissuq.studies.earlier_run import load
@@ -195,7 +200,7 @@ def export(request: Mapping[str, Any], say: Say) -> None:
         "done",
         {
             "files": list(cards.files),
-            "explanations": [*filter(None, [said.of_cards]), *cards.warnings],
+            "explanations": [*filter(None, [said.of_cards]), *cards.warnings, f"{calibrated_stretches(ensemble)}."],
             "example": next(iter(cards.files.values())),
             "folder": target.as_posix(),
             "repeat": {"shell": command("export", [run.as_posix()], options), "python": "\n".join(python)},
@@ -238,10 +243,15 @@ def _measured(request: Mapping[str, Any]) -> tuple[dict[str, Any], Sequence[Any]
     """Return the settings that say what was measured, what was read, and the name of the run."""
     files, modes, reading = _files(request)
     paths = list(map(Path, files))
-    values, readings = measured(paths, reading, modes or None, None, None)
+    values, readings = measured(paths, reading, modes or None, _specimens(request) or None, None)
     values = {name: value for name, value in values.items() if value is not None}
     sources = [Path(test["file"]) for test in values.get("tests") or [values]]
     return values, readings, run_name(paths, None, sources)
+
+
+def _specimens(request: Mapping[str, Any]) -> list[str]:
+    """Return the name of the specimen that all tests are of, where a request says that it is one."""
+    return [SPECIMEN] if request.get("is_one_specimen") else []
 
 
 def _options(request: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:

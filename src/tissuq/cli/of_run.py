@@ -100,6 +100,7 @@ class ExportOptions(LawOfRun, IntoFolder):
 def export(call: Call[ExportSettings, ExportOptions]) -> None:
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
     from tissuq.export import card_format
+    from tissuq.export.cards import calibrated_stretches
     from tissuq.report.cards import INDEX, write_cards
     from tissuq.report.source_run import said_by
     from tissuq.report.terminal import print_explanations, print_next, print_uses
@@ -119,7 +120,7 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     cards = write_cards(ensemble, target, settings.format, force=call.how.force, **of_cards | {"source": source})
     if use := said.use:
         print_uses([{"purpose": use.purpose, "verdict": use.verdict, "reason": use.reason}])
-    print_explanations(cards.warnings)
+    print_explanations([*cards.warnings, f"In the cards: {calibrated_stretches(ensemble)}."])
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]
     print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
     print(f"The most typical draw, nearest to the median stresses: {files[distances.index(min(distances))]}")

@@ -23,6 +23,7 @@ __all__ = [
     "CardSettings",
     "Cards",
     "UnitSystem",
+    "calibrated_stretches",
     "card_format",
     "card_formats",
     "distances_from_median",
@@ -227,8 +228,13 @@ def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
         )
     else:
         yield "admissible: not looked at, draws may be unstable"
+    yield calibrated_stretches(ensemble)
+
+
+def calibrated_stretches(ensemble: Ensemble) -> str:
+    """Return in words how far draws are known in every loading mode."""
     ends = (f"{mode} {low:.4g} to {high:.4g}" for mode, (low, high) in ensemble.ranges.items())
-    yield f"calibrated stretches: {', '.join(ends)}; beyond, the card is an extrapolation"
+    return f"calibrated stretches: {', '.join(ends)}; beyond, the card is an extrapolation"
 
 
 def origin_sentences(ensemble: Ensemble) -> tuple[str, ...]:

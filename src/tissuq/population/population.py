@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tissuq.inference.enumerators.nuts import NutsDraws
+    from tissuq.population.answer import PopulationAnswer
 
 __all__ = ["Population"]
 
@@ -89,6 +90,25 @@ class Population(PopulationDraws):
     def warnings(self) -> tuple[str, ...]:
         """Warnings that the user must read, in sentences."""
         return warnings_of(self)
+
+    @cached_property
+    def answer(self) -> PopulationAnswer:
+        """What it says before everything else: a new specimen, the law, and for what both can be used.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.8, 0.9, 1.1, 1.2, 1.3]
+        >>> moduli = {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45}
+        >>> specimens = {name: tq.simulate("neo-hookean", {"C10": modulus}, stretch, noise_sd=0.01, seed=seed)
+        ...              for seed, (name, modulus) in enumerate(moduli.items())}
+        >>> answer = tq.fit_population(specimens, discrepancy="none", noise_sd=0.01).answer
+        >>> answer.estimates[0].name, [str(use.verdict) for use in answer.uses]
+        ('initial shear modulus of a new specimen', ['with care', 'no', 'no'])
+        """
+        from tissuq.population.answer import answer_of_population
+
+        return answer_of_population(self)
 
     def summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
         """Return median and interval of every pooled parameter, by partial and by complete pooling.

@@ -10,6 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.errors import TissuqError
+from tissuq.population.answer import (
+    MODULUS,
+    about_law,
+    about_modulus,
+    headline,
+    share_of_discrepancy,
+    use_of_law_alone,
+)
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
 from tissuq.population.uses import uses_of_population
@@ -17,21 +25,13 @@ from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
 from tissuq.report.population_figures import (
-    MODULUS,
     Bands,
     Measured,
-    headline,
     headline_figure,
     patient_figure,
     specimens_figure,
 )
-from tissuq.report.population_in_words import (
-    about_law,
-    about_modulus,
-    next_step_of,
-    share_of_discrepancy,
-    use_of_law_alone,
-)
+from tissuq.report.population_in_words import next_step_of
 from tissuq.report.population_tables import (
     effects_of_covariates,
     needed_of,

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from tissuq.assessment.modulus import modulus_symbols
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
-from tissuq.mechanics import initial_shear_modulus
+from tissuq.population.answer import headline
 from tissuq.population.picture import draw_specimens, height_of
 
 if TYPE_CHECKING:
@@ -23,25 +22,12 @@ if TYPE_CHECKING:
 
     from tissuq.population import Population
 
-__all__ = ["MODULUS", "Bands", "Measured", "headline", "headline_figure", "patient_figure", "specimens_figure"]
+__all__ = ["Bands", "Measured", "headline_figure", "patient_figure", "specimens_figure"]
 
 Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
 """Stress of a new specimen with the model error, and of the material alone."""
 Measured: TypeAlias = tuple[LoadingMode, int]
 """A loading mode and the number of one of its stresses."""
-MODULUS = "initial shear modulus"
-
-
-def headline(population: Population) -> tuple[str, float]:
-    """Return what a page says first, and its ratio to the first parameter.
-
-    The initial shear modulus where it is a multiple of the first parameter, and this parameter otherwise.
-    """
-    model, symbol = population.complete.model, population.symbols[0]
-    if modulus_symbols(model) != (symbol,) or model.bent_symbols:
-        return symbol, 1.0
-    of_the_first = [float(parameter.symbol == symbol) for parameter in model.material.parameters]
-    return MODULUS, initial_shear_modulus(model.material, of_the_first)
 
 
 def headline_figure(population: Population, unit: StressUnit) -> Figure:

@@ -1,21 +1,16 @@
-"""What a page says of the law of a population, and what to do next with it."""
+"""What a page says is to be done next with a population."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from tissuq.assessment.extent import has_energy
-from tissuq.assessment.shares import shares_of_discrepancy
-from tissuq.assessment.uses import COMPUTING, PRECISE, Use, Verdict
+from tissuq.assessment.uses import PRECISE, Use, Verdict
 from tissuq.population import Population
-from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING, share_of_initial_stiffness
+from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import far_specimens
-from tissuq.report.population_figures import MODULUS
 from tissuq.result_warning import has_code
 
-__all__ = ["about_law", "about_modulus", "next_step_of", "share_of_discrepancy", "use_of_law_alone"]
+__all__ = ["next_step_of"]
 
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
@@ -85,53 +80,3 @@ def next_step_of(
             "sets them apart (--covariates)"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
-
-
-def use_of_law_alone(share: float, predicting: Use) -> Use:
-    """Return whether a new specimen serves further computations, which have the law alone.
-
-    Parameters
-    ----------
-    share : float
-        Of the stress which the discrepancy carries.
-    predicting : Use
-        Of the stress of a new specimen where others were measured.
-    """
-    if share > PRECISE:
-        carried = f"which carries {100 * share:.0f} % of the stress (median of the specimens)"
-        return Use(COMPUTING, Verdict.NO, f"cards and predictions leave out the discrepancy, {carried}")
-    if predicting.reason == NOT_PREDICTED:
-        return Use(COMPUTING, Verdict.CARE, "how well its stress is known was not computed")
-    return predicting._replace(purpose=COMPUTING)
-
-
-def about_law(population: Population, share: float) -> str:
-    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
-    if share <= PRECISE:
-        return ""
-    law = population.complete.model.material.name
-    return (
-        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress (median of the "
-        f"specimens), and cards of a new specimen are of {law} alone."
-    )
-
-
-def about_modulus(population: Population, share: float, words: str) -> str:
-    """Return why the modulus of a law that is wrong can be right, as a sentence after others."""
-    initial = share_of_initial_stiffness(population)
-    if words != MODULUS or not initial <= PRECISE < share:
-        return ""
-    return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
-
-
-def share_of_discrepancy(population: Population, warnings: Sequence[str], at_rest: Sequence[str] = ()) -> float:
-    """Return the share of the stress that the discrepancy carries: the median of the specimens without stress at rest.
-
-    Zero where it is not known of most specimens, or which of them have stress at rest.
-    """
-    posteriors = population.posteriors
-    fits = [fit for name, fit in posteriors.items() if name not in at_rest and has_energy(fit.solution.model)]
-    shares = [shares_of_discrepancy(fit.solution)[0] for fit in fits]
-    known = [share for share, _, high in shares if high < 1]
-    is_known_where = bool(at_rest) or not has_code(warnings, "stress-at-rest")
-    return float(np.median(known)) if 2 * len(known) > len(posteriors) and is_known_where else 0.0

@@ -59,8 +59,9 @@ const measured = () => {
   return { files: state.files, reading: state.reading, modes: modes.some(Boolean) ? modes.map((mode, i) => mode || seen(state.files[i])) : [] };
 };
 const fitted = () => { // with a mode for every test: one file may hold tests in several
-  const { modes, ...request } = measured();
-  return { ...request, modes: modes.length ? (state.found?.tests ?? []).map(test => state.modes[test.file] || test.mode) : [] };
+  const { modes, ...request } = measured(), tests = state.found?.tests ?? [];
+  const are_said = modes.length || (tests.length > 1 && tests.some(test => test.is_mode_assumed)); // of several tests none is assumed unsaid
+  return { ...request, modes: are_said ? tests.map(test => state.modes[test.file] || test.mode) : [] };
 };
 
 const changedSince = () => { byId("stale").hidden = !state.answer || state.fitted === JSON.stringify([fitted(), fitOptions()]); };
@@ -126,7 +127,8 @@ const upload = safely(async files => {
 
 const fitOptions = () => ({
   material: byId("material").value, discrepancies: byId("discrepancy").value ? [byId("discrepancy").value] : [], estimand: byId("estimand").value,
-  noise_sd: byId("noise").value.trim() ? Number(byId("noise").value) : null, stable_in: byId("stable").checked ? ["all"] : [] });
+  noise_sd: byId("noise").value.trim() ? Number(byId("noise").value) : null, stable_in: byId("stable").checked ? ["all"] : [],
+  is_one_specimen: byId("one-specimen").checked });
 
 const fit = safely(async event => {
   event.preventDefault();

@@ -1,5 +1,5 @@
 // The answer, and what comes of going on from it.
-import { byId, fill, make, repeatOf, tableOf, warningsOf } from "./dom.js";
+import { byId, fill, make, onPage, repeatOf, tableOf, warningsOf } from "./dom.js";
 
 export const showAnswer = answer => {
   const [first, ...others] = answer.numbers, number = item => [`${item.name} `, make("strong", { textContent: item.text }), make("span", { textContent: ` ${item.remark}` })];
@@ -12,7 +12,7 @@ export const showAnswer = answer => {
       make("p", { className: "soft", textContent: answer.finding })),
     make("ul", { className: "uses" }, ...answer.uses.map(use => make("li", { className: use.verdict.split(" ")[0] },
       make("strong", { textContent: `${use.verdict.toUpperCase()}: ` }), use.purpose, make("span", { textContent: use.reason })))),
-    make("p", {}, make("strong", { textContent: "Next: " }), answer.next),
+    make("p", {}, make("strong", { textContent: "Next: " }), onPage(answer.next)),
     ...warningsOf(answer.shown.filter(warning => warning.severity !== "problem")),
     answer.folded.length ? make("details", {}, make("summary", { textContent: `${answer.folded.length} further warnings and notes` }), ...warningsOf(answer.folded)) : null,
     repeatOf(answer.repeat));

@@ -14,6 +14,7 @@ from tissuq.experiments.reading.columns_of_tube import (
     HOW_TO_READ_TUBE,
     HOW_TO_SAY_AXIAL_STRETCH,
     column_of_axial_stretch,
+    is_axial_displacement,
     is_of_length,
 )
 from tissuq.experiments.reading.dimensions import Dimensions
@@ -36,6 +37,8 @@ LARGEST = 4.0
 """Axial stretch beyond which a number is hardly one, but percent."""
 ROWS_AT_EACH = 3
 """Rows at each axial stretch, on average at least, where it is held."""
+NOTABLE_STRETCH = 0.1
+"""Strain along the axis from which it matters at which one the wall was measured: 5 % of the stress."""
 MOST_LISTED = 6
 """Number of axial stretches that a text lists."""
 AT_ITS_LENGTH = (
@@ -139,16 +142,18 @@ def _required(table: Table, given: float | None, dimensions: Dimensions, options
 def _from_length(table: Table, column: int, dimensions: Dimensions, options: ReadingOptions) -> tuple[Column, str]:
     """Return the axial stretches that lengths of the tube are, and how they were obtained."""
     if "length" not in dimensions.sizes and "length" not in dimensions.ambiguous:
+        what = "axial displacement" if is_axial_displacement(table, column) else "length"
         raise InputError(
-            f"{table.place(column)} is the length of a tube, and its length when it is neither stretched nor inflated "
+            f"{table.place(column)} is the {what} of a tube, and its length when it is neither stretched nor inflated "
             'is not known: give it as --length "8 mm" (in Python length="8 mm"), or the axial stretch as '
             "--axial-stretch 1.5."
         )
     length = dimensions.length
     factor, unit_source = factor_of(table, column, LENGTH, "displacement_unit", options)
     (values,) = table.numbers([column])
-    source = f"column {table.label(column)} in {unit_source} / {length.value:g} mm (length {length.source})"
-    return values * factor / length.value, f"axial stretch = {source}"
+    before = "1 + " if is_axial_displacement(table, column) else ""
+    source = f"{before}column {table.label(column)} in {unit_source} / {length.value:g} mm (length {length.source})"
+    return values * factor / length.value + bool(before), f"axial stretch = {source}"
 
 
 def _check_held(table: Table, axial_stretch: Column) -> None:
@@ -184,10 +189,15 @@ def note_of_tube(tube: Tube, axial: AxialStretch | None) -> str:
 
 def note_of_stretched_tube(axial_stretch: Column, load: str = "") -> str:
     """Return what is taken of a tube that was stretched along its axis, and of its axial force, if that is read."""
-    what = WHICH_FORCE[load]
+    what, largest = WHICH_FORCE[load], float(np.max(axial_stretch))
+    measured_stretched = (
+        f" A wall that was measured at {largest:.3g} times its length, without pressure, is about "
+        f"{np.sqrt(largest):.3g} times as thick undeformed, and its stresses are less by that factor."
+    )
     return (
         f"the tube is taken as held at {stretches_held(axial_stretch)} times its undeformed length, and as free of "
-        f"stress when it is neither stretched nor inflated, the state that --diameter and --thickness are of. {what}"
+        "stress when it is neither stretched nor inflated, the state that --diameter and --thickness are of."
+        f"{measured_stretched * (abs(largest - 1) > NOTABLE_STRETCH)} {what}"
     )
 
 

@@ -32,6 +32,7 @@ __all__ = [
     "HOW_TO_SAY_AXIAL_STRETCH",
     "column_of_axial_stretch",
     "columns_of_tube",
+    "is_axial_displacement",
     "is_of_length",
     "mode_of_tube",
     "with_columns_of_tube",
@@ -43,8 +44,8 @@ ROLES_BESIDE = ("length", ROLE_OF_AXIAL_STRETCH)
 """Either is of what tells the axial stretch."""
 HOW_TO_SAY_AXIAL_STRETCH = (
     "its length over that when it is neither stretched nor inflated: --axial-stretch 1.5 (in Python "
-    f"axial_stretch=1.5), or --column {ROLE_OF_AXIAL_STRETCH}=NAME for a column of it, or of the length, with --length "
-    '"8 mm" for the undeformed one.'
+    f"axial_stretch=1.5), or --column {ROLE_OF_AXIAL_STRETCH}=NAME for a column of it, or of the length or the axial "
+    'displacement, with --length "8 mm" for the undeformed length.'
 )
 HOW_TO_READ_TUBE = (
     'If it was held at its undeformed length, give --mode planar --diameter "3 mm" --thickness "0.5 mm": its '
@@ -123,7 +124,8 @@ def columns_of_tube(table: Table, mode: LoadingMode, options: ReadingOptions) ->
 def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None:
     """Return the column of the axial stretch, or of the length, in its role or by its name; None where there is none.
 
-    A length that is the same in all rows may be the undeformed one, unless that is given.
+    A length that is the same in all rows may be the undeformed one, unless that is given. With it a displacement of the
+    machine tells the length, too.
 
     Raises
     ------
@@ -140,9 +142,11 @@ def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None
         columns = [
             column
             for column, quantity in enumerate(table.quantities)
-            if LENGTH_OF_TUBE.fullmatch(quantity)
-            and is_of_length(table, column)
-            and (is_known or not table.is_constant(column))
+            if is_of_length(table, column)
+            and (
+                (LENGTH_OF_TUBE.fullmatch(quantity) and (is_known or not table.is_constant(column)))
+                or (is_known and is_axial_displacement(table, column))
+            )
         ]
     if len(columns) > 1:
         labels = " and ".join(map(table.label, columns))
@@ -156,6 +160,11 @@ def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None
 def is_of_length(table: Table, column: int) -> bool:
     """Tell whether a column has a unit of length."""
     return measured_in(table.unit(column)) == "length"
+
+
+def is_axial_displacement(table: Table, column: int) -> bool:
+    """Tell whether a column of lengths holds what a tube is longer by, by its name."""
+    return table.quantities[column] in ROLES["displacement"]
 
 
 def _contents(table: Table, options: ReadingOptions) -> Contents:

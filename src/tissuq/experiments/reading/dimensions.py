@@ -72,7 +72,7 @@ class Dimensions:
         area_too = f" Forces need the undeformed cross-section, too: {HOW_TO_GIVE_SECTION}"
         return self._size(
             "length",
-            "to turn displacements into stretches give the undeformed length: length '20 mm' "
+            "to turn displacements into stretches give the undeformed length "
             '(--length "20 mm"; in Python dimensions={"length": "20 mm"}).'
             + area_too
             * (self.divide_forces and not sections_of(self.sizes)),

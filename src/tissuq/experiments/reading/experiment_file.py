@@ -30,6 +30,7 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
+from tissuq.experiments.reading.python_form import refusals_worded_for, wording_for
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.regions import (
     AUTO,
@@ -265,9 +266,10 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     >>> tq.read(frame, stress="P [kPa]").stress.tolist()
     [0.0, 0.0025, 0.0055]
     """
-    reading = read_file(path, **options)
+    with refusals_worded_for(path):
+        reading = read_file(path, **options)
     for text in reading.notes:
-        warnings.warn(text, stacklevel=2)
+        warnings.warn(wording_for(path)(text), stacklevel=2)
     return reading.experiment
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Unpack
 
@@ -11,11 +11,12 @@ import numpy as np
 from tissuq.experiments.numbers import wrapped
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.axial_stretch import stretches_held
-from tissuq.experiments.reading.columns_of_tube import is_of_length
+from tissuq.experiments.reading.columns_of_tube import is_axial_displacement, is_of_length
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.options import PythonOptions
+from tissuq.experiments.reading.python_form import refusals_worded_for, wording_for
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, SPREADS
 from tissuq.experiments.units import stress_unit
@@ -42,16 +43,19 @@ class Inspection:
     noise_sds : tuple of float or None
         Estimate of the noise of the engineering stress, MPa, of each stress of the loading mode; None where the
         measurements do not show it.
+    worded : callable
+        How notes are worded: as they are, or in Python's terms.
     """
 
     reading: Reading
     noise_sds: tuple[float | None, ...]
+    worded: Callable[[str], str] = str
 
     @classmethod
-    def of(cls, reading: Reading) -> Inspection:
+    def of(cls, reading: Reading, worded: Callable[[str], str] = str) -> Inspection:
         """Return what was understood of a file that has been read."""
-        course = reading.used.course
-        return cls(reading, tuple(noise_between_neighbours(course, stress) for stress in reading.used.stress))
+        course, stresses = reading.used.course, reading.used.stress
+        return cls(reading, tuple(noise_between_neighbours(course, stress) for stress in stresses), worded)
 
     @property
     def line(self) -> str:
@@ -77,7 +81,7 @@ class Inspection:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a person should look at before fitting."""
-        return data_warnings(self.reading)
+        return tuple(map(self.worded, data_warnings(self.reading)))
 
     def __str__(self) -> str:
         doubts = [text for text in self.warnings if is_doubtful(text)]
@@ -142,7 +146,8 @@ class Inspection:
                     _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
                 )
         if (column := self.reading.axial_column) is not None:
-            roles[column] = "length of the tube" if is_of_length(table, column) else "axial stretch"
+            what = "axial displacement" if is_axial_displacement(table, column) else "length"
+            roles[column] = f"{what} of the tube" if is_of_length(table, column) else "axial stretch"
         for column in range(len(table.names)):
             if self.reading.mode_source == f"column {table.label(column)}":
                 roles[column] = "loading mode"
@@ -189,7 +194,8 @@ def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
     >>> print(inspection.steps[0])
     stretch = column 'stretch'
     """
-    return Inspection.of(read_file(path, **options))
+    with refusals_worded_for(path):
+        return Inspection.of(read_file(path, **options), wording_for(path))
 
 
 def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:

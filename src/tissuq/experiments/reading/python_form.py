@@ -1,0 +1,102 @@
+"""Messages about tables in memory propose what a person types in Python: arguments, not options of the shell."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from json import dumps
+from typing import Any
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.data_frame import is_data_frame
+from tissuq.experiments.reading.options import PARTS
+
+__all__ = ["in_python", "refusals_worded_for", "wording_for"]
+
+SWITCHES = {
+    "compression-positive": "compression_positive=True",
+    "tension-positive": "compression_positive=False",
+    "until-peak": "until_peak=True",
+    "relaxed": "relaxed=True",
+    "incompressible": "incompressible=True",
+}
+"""Options without a value."""
+NUMBERS = ("every", "table", "mean-of", "cycle", "axial-stretch", "skip-rows", "sheet")
+"""Options whose values are numbers in Python, where they are numbers."""
+OTHER_NAMES = {"stretch": "stretch_range"}
+"""Arguments that are not called as their options are."""
+WORDS = frozenset(["or", "and", "for", "to", "with", "of", "as", "in", "where", "if", "once", "out", "instead", "is"])
+"""What may follow an option in a sentence, and is no value."""
+COMMAND = r"(?P<command>tissuq [a-z]+(?: (?:[A-Z][\w.#*]*|'[^']*'|--[a-z-]+(?: (?:'[^']*'|\"[^\"]*\"))?))+)"
+OPTION = r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+)))?"""
+EITHER = re.compile(f"{COMMAND}|{OPTION}")
+BESIDE = re.compile(r"(; in Python [^()]*(?=\)))|( \(in Python [^();]*(?:; (?P<rest>[^()]*))?\))")
+"""The Python form that some messages have beside that of the shell."""
+VALUE = r"""=(?:"[^"]*"|'[^']*'|[^\s()]+)"""
+AGAIN = re.compile(rf"\b(?P<name>\w+)(?P<value>{VALUE})? \((?P=name)(?P<again>{VALUE})?\)")
+"""An argument that is said twice, as in ``area (area="10 mm2")``."""
+
+
+def in_python(text: str) -> str:
+    """Return a message with what it proposes as arguments of `tissuq.read` and its like; commands stay as they are.
+
+    Examples
+    --------
+    >>> in_python('say which it is: --column stress=NAME (or force=), with --leave-out 40:59.')
+    'say which it is: stress="NAME" (or force=), with leave_out="40:59".'
+    >>> in_python('give the cross-section: area (--area "10 mm2"), or --width "5 mm" --thickness "2 mm".')
+    'give the cross-section: area="10 mm2", or width="5 mm", thickness="2 mm".'
+    """
+    text = BESIDE.sub(lambda match: f" ({match['rest']})" if match["rest"] else "", text)
+    pieces, end, is_argument = list[str](), 0, False
+    for match in EITHER.finditer(text):
+        between = text[end : match.start()]
+        is_next = is_argument and between == " "
+        written, is_argument = (match[0], False) if match["command"] else _argument(match["name"], match["value"] or "")
+        pieces += [", " if is_next and match["name"] else between, written]
+        end = match.end()
+    return AGAIN.sub(
+        lambda match: match["name"] + (match["value"] or match["again"] or ""), "".join([*pieces, text[end:]])
+    )
+
+
+def _argument(option: str, typed: str) -> tuple[str, bool]:
+    """Return an option as an argument, and whether it has a value."""
+    value = typed.rstrip(".:")
+    rest = typed[len(value) :]
+    if option in SWITCHES:
+        return SWITCHES[option] + (f" {typed}" if typed else ""), not typed
+    name = OTHER_NAMES.get(option, option.replace("-", "_"))
+    if not value or value in WORDS:
+        return name + (f" {typed}" if typed else ""), False
+    quoted = value[1:-1] if value[0] in "'\"" else value
+    if option in ("column", "only"):
+        role, _, column = quoted.partition("=")
+        column = column.strip("'\"")
+        shown = column if column.isdecimal() else dumps(column, ensure_ascii=False)
+        if option == "only" or PARTS.get(role) != "columns":
+            return (
+                f"{'only' if option == 'only' else 'columns'}={{{dumps(role, ensure_ascii=False)}: {shown}}}{rest}",
+                True,
+            )
+        return f"{role}={shown}{rest}", True
+    if option == "stretch":
+        return f"{name}=({', '.join(quoted.split(':'))}){rest}", True
+    is_number = option in NUMBERS and re.fullmatch(r"[\d.]+", quoted)
+    return f"{name}={quoted if is_number else dumps(quoted, ensure_ascii=False)}{rest}", True
+
+
+def wording_for(data: Any) -> Callable[[str], str]:
+    """Return how messages about measurements are worded: those about tables in memory propose arguments alone."""
+    return in_python if is_data_frame(data) else str
+
+
+@contextmanager
+def refusals_worded_for(data: Any) -> Iterator[None]:
+    """Word refusals as all messages about these measurements."""
+    try:
+        yield
+    except InputError as refusal:
+        refusal.args = (wording_for(data)(str(refusal)),)
+        raise

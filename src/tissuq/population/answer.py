@@ -1,0 +1,181 @@
+"""The answer of a population first: what to expect of a new specimen, the law, and for what both can be used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import exp
+from typing import NamedTuple
+
+import numpy as np
+
+from tissuq.assessment.extent import has_energy
+from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.shares import shares_of_discrepancy
+from tissuq.assessment.uses import COMPUTING, PRECISE, Use, Verdict
+from tissuq.errors import TissuqError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.mechanics import initial_shear_modulus
+from tissuq.population.picture import numbers_of
+from tissuq.population.population import Population
+from tissuq.population.uses import NOT_PREDICTED, share_of_initial_stiffness, uses_of_population
+from tissuq.prediction.bands import Band
+from tissuq.result_warning import has_code
+
+__all__ = [
+    "MODULUS",
+    "PopulationAnswer",
+    "PopulationEstimate",
+    "about_law",
+    "about_modulus",
+    "answer_of_population",
+    "headline",
+    "share_of_discrepancy",
+    "use_of_law_alone",
+]
+
+MODULUS = "initial shear modulus"
+ENDS = ("hdi_low", "hdi_high")
+POINTS = 41
+"""Of the stress of a new specimen, by which it is judged how well it is predicted."""
+
+
+class PopulationEstimate(NamedTuple):
+    """A number of a population: its name, median, the ends of its 95 % interval, and their unit."""
+
+    name: str
+    median: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class PopulationAnswer:
+    """What a population says, before everything else.
+
+    Attributes
+    ----------
+    estimates : tuple of PopulationEstimate
+        What is to be expected of a new specimen, the median of the population, and the spread between specimens.
+    uses : tuple of Use
+        Reporting the modulus of the tissue, predicting a new specimen, and finite elements with one.
+    law : str
+        Where the law by itself does not describe the measurements: how much of the stress the discrepancy carries.
+    """
+
+    estimates: tuple[PopulationEstimate, ...]
+    uses: tuple[Use, ...]
+    law: str = ""
+
+    def __str__(self) -> str:
+        lines = [
+            f"{name} {median:.3g}{f' {unit}' * bool(unit)}, 95 % interval {low:.3g} to {high:.3g}"
+            for name, median, low, high, unit in self.estimates
+        ]
+        lines += [self.law] * bool(self.law)
+        return "\n".join([*lines, *(f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses)])
+
+
+def answer_of_population(population: Population) -> PopulationAnswer:
+    """Return the answer that a population gives."""
+    words, times = headline(population)
+    symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
+    unit = population.unit_of(symbol, population.unit())
+    table = numbers_of(population.summary())
+
+    def estimate(name: str, quantity: str, unit_name: str) -> PopulationEstimate:
+        middle, low, high = (table[symbol, quantity][end] for end in ("median", *ENDS))
+        if quantity == "spread" and is_log:
+            return PopulationEstimate(name, exp(middle), exp(low), exp(high), "")
+        return PopulationEstimate(name, times * middle, times * low, times * high, unit_name)
+
+    estimates = (
+        estimate(f"{words} of a new specimen", "new patient", unit.name),
+        estimate(f"{words}, median of the population", "median", unit.name),
+        estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
+    )
+    share = share_of_discrepancy(population, population.warnings)
+    uses = uses_of_population(
+        population, [*_bands(population)], population.warnings, "modulus" if words == MODULUS else words
+    )
+    law = about_law(population, share) + about_modulus(population, share, words)
+    return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip())
+
+
+def _bands(population: Population) -> Iterator[Band]:
+    """Yield the stress of a new specimen where specimens were measured; nothing where it cannot be predicted."""
+    reach = dict[tuple[LoadingMode, int], list[float]]()
+    for fit in population.posteriors.values():
+        for curve in fit.model.experiment.curves:
+            measured = curve.mode, curve.mode.stresses.index(curve.quantity)
+            reach.setdefault(measured, []).extend([curve.abscissa.min(), curve.abscissa.max()])
+    for (mode, channel), ends in reach.items():
+        try:
+            stretch = np.linspace(min(ends), max(ends), POINTS)
+            table = population.new_patient(stretch, mode=mode, channel=channel, unit="MPa")
+        except TissuqError:
+            continue
+        yield Band(*(table[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
+
+
+def headline(population: Population) -> tuple[str, float]:
+    """Return what a page says first, and its ratio to the first parameter.
+
+    The initial shear modulus where it is a multiple of the first parameter, and this parameter otherwise.
+    """
+    model, symbol = population.complete.model, population.symbols[0]
+    if modulus_symbols(model) != (symbol,) or model.bent_symbols:
+        return symbol, 1.0
+    of_the_first = [float(parameter.symbol == symbol) for parameter in model.material.parameters]
+    return MODULUS, initial_shear_modulus(model.material, of_the_first)
+
+
+def use_of_law_alone(share: float, predicting: Use) -> Use:
+    """Return whether a new specimen serves further computations, which have the law alone.
+
+    Parameters
+    ----------
+    share : float
+        Of the stress which the discrepancy carries.
+    predicting : Use
+        Of the stress of a new specimen where others were measured.
+    """
+    if share > PRECISE:
+        carried = f"which carries {100 * share:.0f} % of the stress (median of the specimens)"
+        return Use(COMPUTING, Verdict.NO, f"cards and predictions leave out the discrepancy, {carried}")
+    if predicting.reason == NOT_PREDICTED:
+        return Use(COMPUTING, Verdict.CARE, "how well its stress is known was not computed")
+    return predicting._replace(purpose=COMPUTING)
+
+
+def about_law(population: Population, share: float) -> str:
+    """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
+    if share <= PRECISE:
+        return ""
+    law = population.complete.model.material.name
+    return (
+        f" {law} alone is wrong here: the discrepancy carries {100 * share:.0f} % of the stress (median of the "
+        f"specimens), and cards of a new specimen are of {law} alone."
+    )
+
+
+def about_modulus(population: Population, share: float, words: str) -> str:
+    """Return why the modulus of a law that is wrong can be right, as a sentence after others."""
+    initial = share_of_initial_stiffness(population)
+    if words != MODULUS or not initial <= PRECISE < share:
+        return ""
+    return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
+
+
+def share_of_discrepancy(population: Population, warnings: Sequence[str], at_rest: Sequence[str] = ()) -> float:
+    """Return the share of the stress that the discrepancy carries: the median of the specimens without stress at rest.
+
+    Zero where it is not known of most specimens, or which of them have stress at rest.
+    """
+    posteriors = population.posteriors
+    fits = [fit for name, fit in posteriors.items() if name not in at_rest and has_energy(fit.solution.model)]
+    shares = [shares_of_discrepancy(fit.solution)[0] for fit in fits]
+    known = [share for share, _, high in shares if high < 1]
+    is_known_where = bool(at_rest) or not has_code(warnings, "stress-at-rest")
+    return float(np.median(known)) if 2 * len(known) > len(posteriors) and is_known_where else 0.0
