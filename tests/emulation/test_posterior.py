@@ -270,6 +270,27 @@ def test_a_parameter_that_the_model_does_not_use_is_named_and_one_that_is_hardly
     assert not any("hardly depends on" in text for text in both.warnings)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", [0, 1])
+def test_an_emulator_that_hides_what_the_measurements_tell_is_told_and_no_parameter_said_to_have_no_effect(batch):
+    """The outputs differ by powers of ten over the priors, so that what k does is nothing beside them.
+
+    With the emulator's error and without it the posterior is about the prior: neither is wider than the other.
+    """
+    depth = np.linspace(0.1, 1.0, 12)
+    priors = {"mu": tq.HalfNormal(3), "b": tq.LogNormal(1.0, 1.0), "k": tq.Normal(0, 1)}
+
+    def exponential(parameters):
+        return parameters["mu"] * np.expm1(parameters["b"] * depth) + parameters["k"] * depth**2
+
+    noise = 0.02 * np.random.default_rng(5).standard_normal((2, 12))[batch]
+    data = exponential({"mu": 0.4, "b": 1.5, "k": 0.3}) + noise
+    found = tq.calibrate(depth, data, exponential, priors, noise_sd=0.02, runs=40, seed=1)
+    assert found.error_ratio > 1000
+    assert any("the emulator's error is large" in text for text in found.warnings)
+    assert not any("hardly depends on" in text for text in found.warnings)
+
+
 def test_a_process_pinned_far_from_the_measurements_is_told():
     stretch = np.linspace(1.02, 1.3, 8)
 

@@ -198,3 +198,14 @@ def test_correlations_have_the_prior_of_lewandowski_kurowicka_and_joe_and_effect
     found = [float(_log_posterior(jnp.asarray(point), flat | {"spread": spread})) for point in points]
     wanted = [expected(point) for point in points]
     assert np.diff(found) == pytest.approx(np.diff(wanted), abs=1e-6)
+
+
+def test_a_parameter_that_alone_is_the_modulus_is_positive_and_one_of_several_terms_of_either_sign():
+    stretch = np.linspace(0.7, 1.6, 12)
+    one = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": 5.0}, stretch, noise_sd=0.02, seed=1)
+    data = tq.simulate("mooney-rivlin", {"C10": 0.4, "C01": 0.1}, stretch, noise_sd=0.02, seed=1)
+    laws = {"ogden-1": (one, [True, False]), "mooney-rivlin": (data, [True, False]), "rivlin:C01": (data, [True])}
+    for law, (test, expected) in laws.items():
+        posterior = tq.fit(test, material=law, discrepancy="none", noise_sd=0.02)
+        symbols = [parameter.symbol for parameter in posterior.model.material.parameters]
+        assert coordinates_of([posterior] * 3, symbols).is_log.tolist() == expected, law

@@ -9,10 +9,11 @@ import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.emulation.emulator import Emulator
-from tissuq.emulation.problem import Problem, is_far
+from tissuq.emulation.problem import Problem, is_far, symbol_of
 from tissuq.emulation.runs import EmulatorCheck
 from tissuq.experiments.smoothing import scatter
 from tissuq.model.discrepancy import PinnedProcess
+from tissuq.model.noise import NOISE_SD
 from tissuq.result_warning import ResultWarning, Severity
 
 if TYPE_CHECKING:
@@ -32,6 +33,9 @@ MAX_MEAN_SHIFT = 0.5
 """Largest shift of a mean by the emulator's error without a warning, in posterior standard deviations."""
 MAX_SHIFT_IN_SDS = 10
 """Larger shifts are told as more than that: beside a posterior at a bound, which is as narrow as one likes."""
+MAX_ERROR_SHARE = 0.1
+"""Largest error of the emulator at the posterior, as a share of the measurements, that may be larger than the noise
+without a warning: beyond, a posterior with the error and one without may agree that nothing is known."""
 MAX_RMS_STANDARDISED = 1.5
 """Largest root mean square of the standardised errors of an emulator that is not over-confident."""
 EDGE_WIDTH, MAX_EDGE_PROBABILITY = 0.01, 0.02
@@ -101,7 +105,9 @@ def calibration_warnings(
     """
     if not posterior.converged:
         yield ResultWarning(posterior.verdict, "not-converged", Severity.PROBLEM)
-    if without_effect := list(_without_effect(problem, posterior, totals)):
+    error_share = _error_share(problem, emulator, posterior)
+    without_effect = list(_without_effect(problem, posterior, totals)) if error_share <= MAX_ERROR_SHARE else []
+    if without_effect:
         yield ResultWarning(
             f"the model hardly depends on {', '.join(without_effect)}, and the result is the prior: see whether the "
             "model reads a parameter of this name (--prior).",
@@ -122,7 +128,7 @@ def calibration_warnings(
         severity = Severity.CAUTION if share > MAX_SHARE_NEAR_FAILURES else Severity.NOTE
         yield ResultWarning(f"{emulator.runs.failure_summary} {position}", "inaccurate-emulator", severity)
     if not none_fit:  # of which there is nothing to be made more accurate
-        yield from _large_error(problem, posterior, exact, emulator_share)
+        yield from _large_error(problem, posterior, exact, emulator_share, error_share)
     yield from _over_confident(check)
     at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
@@ -236,10 +242,29 @@ def _noise_is_misfit(problem: Problem, predicted: FloatArray) -> bool:
     return False
 
 
+def _error_share(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> float:
+    """Return the emulator's error at the posterior over the measurements (root mean squares), zero below the noise.
+
+    The largest of all quantities.
+    """
+    draws, share = posterior.thinned(DRAWS_NEAR_FAILURES), 0.0
+    variances = np.diagonal(emulator.moments(draws[:, : len(problem.forward_symbols)])[1], axis1=1, axis2=2)
+    for name, (start, stop) in problem.quantities.items():
+        error = float(np.median(np.sqrt(variances[:, start:stop].mean(axis=1))))
+        noise_sd = problem.noise_sd[name] or posterior.marginals[symbol_of(NOISE_SD.symbol, name)].mean
+        if error > noise_sd:
+            share = max(share, error / float(_rms(problem.measured[start:stop])))
+    return share
+
+
 def _large_error(
-    problem: Problem, posterior: SampledPosterior, exact: SampledPosterior, emulator_share: Mapping[str, float]
+    problem: Problem,
+    posterior: SampledPosterior,
+    exact: SampledPosterior,
+    emulator_share: Mapping[str, float],
+    error_share: float,
 ) -> Iterator[ResultWarning]:
-    """Yield a warning where the emulator's error widens or shifts the posterior notably."""
+    """Yield a warning where the emulator's error widens or shifts the posterior notably, or hides all there is."""
     forward = problem.forward_symbols
     shifts = {
         symbol: abs(exact.marginals[symbol].mean - marginal.mean) / marginal.sd
@@ -260,6 +285,13 @@ def _large_error(
         yield ResultWarning(
             f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by {multiple} "
             f"standard deviations. {advice}",
+            "inaccurate-emulator",
+        )
+    elif error_share > MAX_ERROR_SHARE:
+        yield ResultWarning(
+            "the emulator's error is larger than the noise where the posterior is: "
+            f"{100 * error_share:.0f} % of the measurements (root mean square), so that these tell little of the "
+            f"parameters. {advice} Priors over which the outputs differ by powers of ten need narrower ones.",
             "inaccurate-emulator",
         )
 
