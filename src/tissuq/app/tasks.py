@@ -134,8 +134,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
 
 def predict(request: Mapping[str, Any], say: Say) -> None:
     """Predict another loading mode from a run; say the bands, and write the folder."""
-    from tissuq.report.prediction import prediction_result
-    from tissuq.report.prediction_tables import band_table
+    from tissuq.report.prediction import band_table, prediction_result
     from tissuq.report.run_folder import run_folder
     from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
@@ -169,7 +168,6 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
 
 def export(request: Mapping[str, Any], say: Say) -> None:
     """Write draws of a run as material cards; say the files and what they are."""
-    from tissuq.export import CardSettings
     from tissuq.report.cards import write_cards
     from tissuq.report.source_run import said_by
     from tissuq.studies.earlier_run import load
@@ -177,14 +175,13 @@ def export(request: Mapping[str, Any], say: Say) -> None:
     format, draws, seed = str(request["format"]), int(request.get("draws") or 20), int(request.get("seed") or 0)
     run, unit = RUNS / _run_name(request), str(request.get("unit") or "MPa")
     keep_all = bool(request.get("all_draws"))
-    settings = CardSettings(unit=unit)
     target = CARDS / f"{run.name}-{format}"
     say("step", "drawing")
     posterior = load(run)
     ensemble, said = posterior.ensemble(draws, seed, admissible=not keep_all), said_by(run, posterior.model)
     say("step", "writing the cards")
-    source = f"run {run.name} of tissuq, sobol draws from seed {seed}" + f"; {said.of_cards}" * bool(said.use)
-    cards = write_cards(ensemble, target, format, force=True, source=source, unit=settings.unit)
+    source = said.source_of_cards(run, "sobol", seed)
+    cards = write_cards(ensemble, target, format, force=True, source=source, unit=unit)
     options = {"format": format, "draws": draws, "unit": unit, "seed": seed, "all_draws": keep_all}
     drawn = f"{draws}, seed={seed}" + (", admissible=False" if keep_all else "")
     python = [

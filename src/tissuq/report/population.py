@@ -28,15 +28,13 @@ from tissuq.report.population_figures import (
 from tissuq.report.population_in_words import (
     about_law,
     about_modulus,
-    next_step_of,
-    share_of_discrepancy,
-    use_of_law_alone,
-)
-from tissuq.report.population_tables import (
     effects_of_covariates,
     needed_of,
     needed_table_of,
+    next_step_of,
     patient_in_words,
+    share_of_discrepancy,
+    use_of_law_alone,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
@@ -174,23 +172,25 @@ def _share(half_width: float) -> str:
 
 def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
     """Return what to expect of a new specimen, and median and spread of the population: of its headline."""
-    population = study.population
-    symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
-    factor, unit = _scale(study, symbol)
-    table = numbers_of(population.summary(unit="MPa"))
-    words, times = headline(population)
-
-    def number(name: str, quantity: str, divisor: float, unit: str) -> Number:
-        median, low, high = (table[symbol, quantity][end] / divisor for end in ("median", *ENDS))
-        return Number(name, median, low, high, unit)
-
-    spread = "spread between specimens" + (", as a factor" if is_log else "")
-    middle, low, high = (exp(table[symbol, "spread"][end]) for end in ("median", *ENDS))
+    words, is_log = headline(study.population)[0], bool(study.population.coordinates.is_log[0])
     return (
-        number(f"{words} of a new specimen{patient_in_words(study)}", "new patient", factor / times, unit),
-        number(f"{words}, median of the population", "median", factor / times, unit),
-        Number(spread, middle, low, high) if is_log else number(spread, "spread", factor / times, unit),
+        _of_headline(study, "new patient", f"{words} of a new specimen{patient_in_words(study)}"),
+        _of_headline(study, "median", f"{words}, median of the population"),
+        _of_headline(study, "spread", f"spread between specimens{', as a factor' * is_log}"),
     )
+
+
+def _of_headline(study: PopulationStudy, quantity: str, name: str = "") -> Number:
+    """Return a quantity of the headline, in the unit of the files; a spread of logarithms as a factor."""
+    population = study.population
+    symbol, (_, times) = population.symbols[0], headline(population)
+    numbers = numbers_of(population.summary(unit="MPa"))[symbol, quantity]
+    middle, low, high = (numbers[end] for end in ("median", *ENDS))
+    if quantity == "spread" and population.coordinates.is_log[0]:
+        return Number(name, exp(middle), exp(low), exp(high))
+    to_mpa, unit = _scale(study, symbol)
+    factor = to_mpa / times
+    return Number(name, middle / factor, low / factor, high / factor, unit)
 
 
 def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predicted: list[str]) -> tuple[Section, ...]:
@@ -372,21 +372,15 @@ def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -
 
 def _lead(study: PopulationStudy) -> str:
     """Return the finding in two sentences."""
-    symbol, (words, times) = study.population.symbols[0], headline(study.population)
-    factor, unit = _scale(study, symbol)
-    factor, quantity = factor / times, symbol if words == symbol else f"the {words}"
-    table = numbers_of(study.population.summary(unit="MPa"))
-    middle, _ = _text(table[symbol, "median"], factor)
-    new, complete = (
-        _text(table[symbol, name], factor)[1].strip("[]").replace(",", " to")
-        for name in ("new patient", "complete pooling")
-    )
+    symbol, words = study.population.symbols[0], headline(study.population)[0]
+    quantity = symbol if words == symbol else f"the {words}"
+    median, new, complete = (_of_headline(study, name) for name in ("median", "new patient", "complete pooling"))
     far = " ".join(
         f"{name} is {ratio:.2g} times as stiff as the others, which makes these intervals as wide as they are."
         for name, ratio in far_specimens(study.population).items()
     )
     return (
-        f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
-        f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
-        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
+        f"The median of {quantity} in the population is {median.text}; for a specimen that has not been measured"
+        f"{patient_in_words(study)} it is {new.range} {new.unit} (95 %). Taking all measurements for those of one "
+        f"specimen would say {complete.range} {new.unit}, which is no range of specimens.{f' {far}' * bool(far)}"
     )

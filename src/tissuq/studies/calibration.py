@@ -32,7 +32,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.result_warning import ResultWarning
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
-from tissuq.studies.earlier_run import load_law, priors_of_run
+from tissuq.studies.earlier_run import load_law, priors_of
 from tissuq.studies.settings import DATA, INPUT, damage_reported
 from tissuq.studies.stream import Step, silent
 
@@ -171,7 +171,8 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
     """Return settings in which the posterior of a run stands as priors; what is stated of a parameter stays."""
     if settings.prior_run is None:
         return settings
-    priors, correlations = priors_of_run(folder / settings.prior_run, str(settings.material), settings.unit)
+    posterior = load_law(folder / settings.prior_run, str(settings.material))
+    priors, correlations = priors_of(posterior, settings.unit)
     stated = settings.priors
     pairs = {",".join(pair): value for pair, value in correlations.items() if not set(pair) & set(stated)}
     changes = {

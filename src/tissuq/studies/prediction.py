@@ -138,6 +138,12 @@ class Prediction:
         ratio = self.mode.paths[channel].cauchy_ratio(self.data.stretch) if self.stress_type == "cauchy" else 1.0
         return np.asarray(self.data.curves[channel].stress * ratio)
 
+    def scores_of(self, kind: bool) -> pd.DataFrame:
+        """Return how all measurements of each stress are predicted, with the discrepancy or without."""
+        assert self.scores is not None  # noqa: S101 (requested only if there are measurements)
+        is_of_kind = self.scores["discrepancy"] == ("with" if kind else "without")
+        return self.scores[is_of_kind & (self.scores["range"] == "all")]
+
     def plot(self, ax: Any = None) -> Any:
         """Draw every stress with the discrepancy, where it is known, and of the material alone: a panel each.
 
@@ -323,8 +329,5 @@ def _title(prediction: Prediction, channel: int, kind: bool) -> str:
     name = f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
     if prediction.scores is None:
         return name
-    rows = prediction.scores[
-        (prediction.scores["discrepancy"] == ("with" if kind else "without")) & (prediction.scores["range"] == "all")
-    ]
-    row = rows.iloc[channel]
+    row = prediction.scores_of(kind).iloc[channel]
     return f"{name}:  {round(row['inside'] * row['count'])} of {row['count']} inside"
