@@ -220,10 +220,10 @@ def band_over_time(bands: Bands, name: str) -> Figure:
 def _draw_band(axis: Axes, bands: Bands, name: str) -> None:
     """Draw mean and band of a quantity over time; of a single time as an interval."""
     table = bands.of_several
-    is_path = len(table) > 1
+    ways = [(slice(None), len(table) > 1)]
     mean, low, high = (table[f"{bands.prefix}{column}"] for column in ("mean", "low", "high"))
-    pieces.band(axis, table["time"], low, high, strength=0.25, label=bands.percent, is_path=is_path)
-    pieces.line(axis, table["time"], mean, label="mean", is_path=is_path)
+    pieces.band(axis, table["time"], low, high, strength=0.25, label=bands.percent, ways=ways)
+    pieces.line(axis, table["time"], mean, label="mean", ways=ways)
     axis.set_xlabel("time")
     axis.set_title(name)
     axis.legend(fontsize=9)
