@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -12,6 +13,7 @@ from tissuq.studies.files_of_tests import measured, run_name
 from tissuq.studies.option_texts import column
 
 if TYPE_CHECKING:
+    from tissuq.report.result import Result
     from tissuq.studies.specimen import SpecimenStudy
 
 __all__ = ["TASKS", "Say", "warm_up"]
@@ -64,11 +66,9 @@ def inspect(request: Mapping[str, Any], say: Say) -> None:
 def fit(request: Mapping[str, Any], say: Say) -> None:
     """Fit a material; say the answer as soon as it is there, then write the run."""
     from tissuq.report.result import few_and_others
-    from tissuq.report.run_folder import run_folder
     from tissuq.report.specimen import specimen_answer, specimen_result
-    from tissuq.report.writer import write_result
+    from tissuq.studies.fit_settings import SpecimenSettings
     from tissuq.studies.specimen import run_specimen
-    from tissuq.studies.specimen_settings import SpecimenSettings
 
     say("step", "reading")
     values, readings, name = _measured(request)
@@ -91,20 +91,15 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
         say("answer", {**record, **of_page})
 
     study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=readings, early=say_answer)
-    say("step", "writing the report")
-    with run_folder(RUNS / name, "fit", force=True) as folder:
-        write_result(specimen_result(study, _sources(settings)), folder, target=RUNS / name)
-    say("done", {"run": name, "report": f"runs/{name}/report.html"})
+    say("done", _written("fit", RUNS / name, partial(specimen_result, study, _sources(settings)), say))
 
 
 def laws(request: Mapping[str, Any], say: Say) -> None:
     """Compare laws; say their table, and write the run."""
     from tissuq.report.laws import law_lead, law_result, law_table
-    from tissuq.report.run_folder import run_folder
-    from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
+    from tissuq.studies.fit_settings import LawSettings
     from tissuq.studies.laws import run_laws
-    from tissuq.studies.specimen_settings import LawSettings
 
     say("step", "reading")
     values, readings, name = _measured(request)
@@ -112,9 +107,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     settings = _settings(LawSettings, values | options)
     study = run_laws(settings, Path(), lambda text: say("step", text), found=readings)
     folder_name = f"{name}-laws"
-    say("step", "writing the report")
-    with run_folder(RUNS / folder_name, "fit", force=True) as folder:
-        write_result(law_result(study, _sources(settings)), folder, target=RUNS / folder_name)
+    written = _written("fit", RUNS / folder_name, partial(law_result, study, _sources(settings)), say)
     shell = _shell("fit", *_files(request), options | {"out": f"runs/{folder_name}"})
     table = law_table(study)
     say(
@@ -125,18 +118,15 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
             "rows": table.rows,
             "skipped": dict(study.skipped),
             "warnings": [{"severity": w.severity, "text": in_shell(w)} for w in study.warnings],
-            "run": folder_name,
-            "report": f"runs/{folder_name}/report.html",
             "repeat": {"shell": shell, "python": fit_lines(values | options, study.experiment.stress_unit)},
-        },
+        }
+        | written,
     )
 
 
 def predict(request: Mapping[str, Any], say: Say) -> None:
     """Predict another loading mode from a run; say the bands, and write the folder."""
     from tissuq.report.prediction import band_table, prediction_result
-    from tissuq.report.run_folder import run_folder
-    from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
     from tissuq.studies.predict_run import run_prediction
     from tissuq.studies.run_settings import PredictionSettings
@@ -146,9 +136,7 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
     settings = _settings(PredictionSettings, {"run": run.as_posix(), **options})
     prediction = run_prediction(settings, Path(), lambda text: say("step", text))
     target = RUNS / f"{run.name}-{prediction.mode.name}"
-    say("step", "writing the report")
-    with run_folder(target, "predict", force=True) as folder:
-        write_result(prediction_result(prediction, settings, target), folder)
+    written = _written("predict", target, partial(prediction_result, prediction, settings, target), say)
     points, table = settings.points_of(prediction.mode.name), band_table(prediction)
     python = [*_imports(points), f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'
               f"{_points_in_python(settings, points)})", "print(prediction.table)"]  # fmt: skip
@@ -159,10 +147,9 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
             "rows": table.rows,
             "title": table.title,
             "warnings": list(map(in_shell, prediction.warnings)),
-            "run": target.name,
-            "report": f"{target.as_posix()}/report.html",
             "repeat": {"shell": command("predict", [run.as_posix()], options), "python": "\n".join(python)},
-        },
+        }
+        | written,
     )
 
 
@@ -251,6 +238,17 @@ def _settings(kind: Any, values: dict[str, Any]) -> Any:
     from tissuq.studies.settings import load_settings
 
     return load_settings(kind, None, values, rivals=("noise", "noise_sd"))
+
+
+def _written(verb: str, target: Path, result_of: Callable[[], Result], say: Say) -> dict[str, str]:
+    """Write what has come of a command as a run; return what the page is told of it."""
+    from tissuq.report.run_folder import run_folder
+    from tissuq.report.writer import write_result
+
+    say("step", "writing the report")
+    with run_folder(target, verb, force=True) as folder:
+        write_result(result_of(), folder, target=target)
+    return {"run": target.name, "report": f"{target.as_posix()}/report.html"}
 
 
 def _sources(settings: Any) -> list[Path]:

@@ -7,14 +7,12 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.cli.call import SCHEDULER, Call, Configured, LawOfRun, SolverOptions
-from tissuq.cli.campaign import check_folder, write_campaign_recipe
+from tissuq.cli.call import SCHEDULER, Call, Configured, LawOfRun, SolverOptions, check_folder, write_campaign_recipe
 from tissuq.cli.command import command
 from tissuq.errors import InputError
-from tissuq.studies.model_settings import EnsembleSettings
+from tissuq.studies.finite_element_settings import EnsembleSettings, SimulationSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import once_each
-from tissuq.studies.simulation_settings import SimulationSettings
 
 if TYPE_CHECKING:
     from tissuq.studies.ensemble import PreparedEnsemble

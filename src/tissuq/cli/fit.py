@@ -15,11 +15,10 @@ from tissuq.cli.command import command
 from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.files_of_tests import files_of, measured, run_name
+from tissuq.studies.fit_settings import ALL, LawSettings, PopulationSettings, SpecimenSettings
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import option
-from tissuq.studies.population_settings import PopulationSettings
 from tissuq.studies.settings import setting_of
-from tissuq.studies.specimen_settings import ALL, LawSettings, SpecimenSettings
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading

@@ -10,7 +10,7 @@ from tissuq.cli.call import Call, IntoFolder, LawOfRun, OfRun, not_converged
 from tissuq.cli.command import command
 from tissuq.errors import InputError
 from tissuq.studies.files_of_tests import resolve
-from tissuq.studies.model_settings import CardOptions
+from tissuq.studies.finite_element_settings import CardOptions
 from tissuq.studies.option import option, sampling
 from tissuq.studies.run_settings import DesignSettings, PredictionSettings, RunSettings
 from tissuq.studies.settings import seen_from

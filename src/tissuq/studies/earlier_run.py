@@ -134,7 +134,7 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
     InputError
         When the folder is no such run.
     """
-    from tissuq.studies.specimen_settings import LawSettings, SpecimenSettings
+    from tissuq.studies.fit_settings import LawSettings, SpecimenSettings
 
     run = Path(folder)
     recipe = run / RECIPE

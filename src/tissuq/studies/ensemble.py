@@ -25,7 +25,7 @@ from tissuq.finite_elements.simulation import COMPLETE, FINE_MESH, MATERIAL_ONLY
 from tissuq.mechanics import Material
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.studies.earlier_run import load
-from tissuq.studies.model_settings import EnsembleSettings
+from tissuq.studies.finite_element_settings import EnsembleSettings
 from tissuq.studies.stream import RESULTS, Step, forget_results, read_results, run_tasks, silent
 
 if TYPE_CHECKING:
