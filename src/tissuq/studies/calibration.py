@@ -187,7 +187,7 @@ def _check_other_measurements(settings: CalibrationSettings, data: Mapping[str, 
     """Refuse the posterior of measurements as the prior beside them, whatever their file is called and in any unit."""
     for name, measured in data.items():
         fitted = [
-            *_stresses_of(run, str(settings.material)),
+            *(curve.stress for curve in load_law(run, str(settings.material)).model.experiment.curves),
             *_stresses_of_specimens(run, len(measured.measured), settings.every),
             *_columns_of_inputs(settings, measured, run),
         ]
@@ -197,12 +197,6 @@ def _check_other_measurements(settings: CalibrationSettings, data: Mapping[str, 
                 f"({measured.measured_label}), which would count twice: give a run of other tests (--prior-run), or "
                 "the priors themselves, as --prior C10=uniform(0.1, 5)."
             )
-
-
-def _stresses_of(run: Path, material: str) -> Iterator[FloatArray]:
-    """Yield the stresses to which a run was fitted."""
-    for curve in load_law(run, material).model.experiment.curves:
-        yield curve.stress
 
 
 def _stresses_of_specimens(run: Path, count: int, stride: int) -> Iterator[FloatArray]:

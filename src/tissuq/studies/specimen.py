@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -165,8 +165,8 @@ def run_specimen(
     if not posteriors:
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
-    read_warnings = warnings_of_files(readings)
-    early(SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {}, read_warnings))
+    study = SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {}, warnings_of_files(readings))
+    early(study)
     step("assessing")
     assessments = {
         name: posterior.assess()
@@ -193,8 +193,7 @@ def run_specimen(
             {"formulation": name} | {str(key): None if value != value else value for key, value in row.items()}
             for row in predictions
         ]
-    results = settings, experiment, posteriors, seconds, skipped, assessments, read_warnings
-    return SpecimenStudy(*results, tuple(held_out))
+    return replace(study, assessments=assessments, held_out=tuple(held_out))
 
 
 def fitted(
