@@ -38,7 +38,7 @@ from tissuq.report.population_in_words import (
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
-from tissuq.report.tables import Row, interval, significant, with_named_units
+from tissuq.report.tables import Row, interval, rows_of, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
 from tissuq.studies.settings import DATA
@@ -109,8 +109,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     share = share_of_discrepancy(population, study.warnings, study.at_rest)
     several = len(study.modes) > 1
     files: dict[str, Any] = {DATA: with_named_units(_data_rows(study, several), ["stress"], unit)}
-    summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
-    tables = {name: _in_units(study, table) for name, table in summaries.items()}
+    summaries = {"population": population.summary, "specimens": population.specimen_summary}
+    tables = {name: _with_units(study, summary(unit=unit.name)) for name, summary in summaries.items()}
     tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
     tables |= {"specimens_needed": needed} if (needed := needed_of(study)) is not None else {}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
@@ -121,7 +121,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
     count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
     modes = ", ".join(mode.name for mode in study.modes)
-    words, predicted = headline(population)[0], [_band(of_mode) for of_mode, _ in bands.values()]
+    columns = ("stretch", "median", "low", "high")
+    predicted = [Band(*(of_mode[name].to_numpy(float) for name in columns)) for of_mode, _ in bands.values()]
+    words = headline(population)[0]
     quantity = "modulus" if words == MODULUS else words
     uses = uses_of_population(population, predicted, study.warnings, quantity, study.at_rest)
     uses = (*uses, use_of_law_alone(share, uses[-1]))
@@ -184,13 +186,11 @@ def _of_headline(study: PopulationStudy, quantity: str, name: str = "") -> Numbe
     """Return a quantity of the headline, in the unit of the files; a spread of logarithms as a factor."""
     population = study.population
     symbol, (_, times) = population.symbols[0], headline(population)
-    numbers = numbers_of(population.summary(unit="MPa"))[symbol, quantity]
+    numbers = numbers_of(population.summary(unit=study.unit.name))[symbol, quantity]
     middle, low, high = (numbers[end] for end in ("median", *ENDS))
     if quantity == "spread" and population.coordinates.is_log[0]:
         return Number(name, exp(middle), exp(low), exp(high))
-    to_mpa, unit = _scale(study, symbol)
-    factor = to_mpa / times
-    return Number(name, middle / factor, low / factor, high / factor, unit)
+    return Number(name, times * middle, times * low, times * high, _unit(study, symbol))
 
 
 def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predicted: list[str]) -> tuple[Section, ...]:
@@ -256,8 +256,7 @@ def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
         for curve in (curve for test in tests for curve in test.curves):
             labels: Row = {"specimen": name} | ({"mode": curve.mode.name} if several else {})
             labels |= {"measured": curve.quantity} if has_stresses else {}
-            pairs = zip(curve.abscissa.tolist(), curve.stress.tolist(), strict=True)
-            rows += [labels | {"stretch": stretch, "stress": stress} for stretch, stress in pairs]
+            rows += rows_of({"stretch": curve.abscissa, "stress": curve.stress}, labels)
     return rows
 
 
@@ -280,11 +279,6 @@ def _bands(study: PopulationStudy) -> tuple[dict[Measured, Bands], list[str]]:
         except TissuqError as error:  # two controls, or some of the population's materials lock before the largest
             not_predicted.append(f"{mode.name}: {error}")
     return bands, not_predicted
-
-
-def _band(table: pd.DataFrame) -> Band:
-    """Return the stress of a new specimen as a band, MPa."""
-    return Band(*(table[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
 
 
 def _band_table(bands: Mapping[Measured, Bands], several: bool) -> pd.DataFrame:
@@ -317,54 +311,50 @@ def _copies(study: PopulationStudy, beside: Path) -> tuple[Copies, dict[str, Any
     return copies, relocated
 
 
-def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table indexed by parameter, and perhaps quantity, in the unit of the files, with a column ``unit``."""
+def _with_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table indexed by parameter, and perhaps quantity, with a column ``unit``."""
     is_log = dict(zip(study.population.symbols, study.population.coordinates.is_log, strict=True))
-    scales = [
-        (1.0, "") if row.get("quantity") == "spread" and is_log[row["parameter"]] else _scale(study, row["parameter"])
+    units = [
+        "" if row.get("quantity") == "spread" and is_log[row["parameter"]] else _unit(study, row["parameter"])
         for row in table.index.to_frame().to_dict("records")
     ]
-    scaled = table.div([factor for factor, _ in scales], axis=0)
-    scaled.insert(0, "unit", [name for _, name in scales])
-    return scaled
+    table.insert(0, "unit", units)
+    return table
 
 
 def _parameters(study: PopulationStudy) -> Table:
     """Return the parameters of the population in the unit of the files."""
     population, rows = study.population, []
-    table = numbers_of(population.summary(unit="MPa"))
+    table = numbers_of(population.summary(unit=study.unit.name))
     for symbol, is_log in zip(population.symbols, population.coordinates.is_log, strict=True):
-        factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
             numbers = table[symbol, quantity]
             if quantity == "spread" and is_log:
                 cells = ["factor", words, *_text({name: exp(number) for name, number in numbers.items()})]
             else:
-                cells = [unit, words, *_text(numbers, factor)]
+                cells = [_unit(study, symbol), words, *_text(numbers)]
             rows.append([symbol, *cells])
     headers = ["parameter", "unit", "quantity", "median", "95 % interval"]
     return Table(headers, rows, f"A population of {len(study.tests)} specimens", (1, 2), _note(population))
 
 
 def _readable_specimens(study: PopulationStudy) -> list[list[str]]:
-    rows, table = [], numbers_of(study.population.specimen_summary(unit="MPa"))
+    rows, table = [], numbers_of(study.population.specimen_summary(unit=study.unit.name))
     for name in study.population.names:
         for symbol in study.population.symbols:
-            factor, unit = _scale(study, symbol)
             numbers = table[name, symbol]
-            rows.append([name, symbol, unit, *_text(numbers, factor, "alone_"), *_text(numbers, factor)])
+            rows.append([name, symbol, _unit(study, symbol), *_text(numbers, "alone_"), *_text(numbers)])
     return rows
 
 
-def _scale(study: PopulationStudy, symbol: str) -> tuple[float, str]:
-    """Return what one unit of a parameter is in MPa, and the unit's name."""
-    unit = study.population.unit_of(symbol, study.unit)
-    return unit.to_mpa, unit.name
+def _unit(study: PopulationStudy, symbol: str) -> str:
+    """Return the name of the unit of a parameter."""
+    return study.population.unit_of(symbol, study.unit).name
 
 
-def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -> tuple[str, str]:
+def _text(numbers: Mapping[str, float], prefix: str = "") -> tuple[str, str]:
     """Return a median and an interval with the decimals that its width supports."""
-    low, middle, high = (numbers[f"{prefix}{name}"] / factor for name in ("hdi_low", "median", "hdi_high"))
+    low, middle, high = (numbers[f"{prefix}{name}"] for name in ("hdi_low", "median", "hdi_high"))
     width = (high - low) / 4
     largest = max(low, middle, high, key=abs)
     return interval(middle, largest, width)[0], "[{}, {}]".format(*interval(low, high, width))
