@@ -6,13 +6,13 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from tissuq.studies.answers import READING, SWITCHES
+
 __all__ = ["Repeat", "command", "fit_lines", "reading_words"]
 
 Repeat = dict[str, str]
 """A ``shell`` command and lines of ``python``."""
-SWITCHES = {("compression_positive", True): "--compression-positive", ("until_peak", True): "--until-peak"}
-SWITCHES |= {("incompressible", True): "--incompressible", ("relaxed", True): "--relaxed"}
-SWITCHES |= {("compression_positive", False): "--tension-positive"}
+WORDS_OF_SWITCHES = {(READING[name].name, says): f"--{name}" for name, says in SWITCHES.items()}
 """Options without a value, by setting and its value."""
 OF_PAIRS = {"columns": "--column", "only": "--only", "tolerances": "--tolerance"}
 OF_FILES = ("file", "name", "specimen", "direction", "condition", "noise_sd")
@@ -57,7 +57,7 @@ def reading_words(reading: Mapping[str, Any]) -> list[str]:
         elif name == "stretch_range" and value is not None:
             words += ["--stretch", ":".join(f"{end:.12g}" for end in value)]
         elif isinstance(value, bool):
-            words += [SWITCHES[name, value]] if (name, value) in SWITCHES else []
+            words += [WORDS_OF_SWITCHES[name, value]] if (name, value) in WORDS_OF_SWITCHES else []
         elif value is not None:
             words += [f"--{name.replace('_', '-')}", str(value)]
     return words
