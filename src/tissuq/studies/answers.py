@@ -15,7 +15,7 @@ from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of, stated
 from tissuq.studies.settings import imported
 
-__all__ = ["DIMENSIONS", "READING", "SWITCHES", "Answer", "answers_in", "options_in", "with_options"]
+__all__ = ["DIMENSIONS", "Answer", "answers_in", "options_in", "with_options"]
 
 READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
 """How every option of reading is taken, by its name; that which says no stands for the same setting."""
