@@ -177,19 +177,15 @@ class Call(Generic[Kind, How]):
         InputError
             When the command line does not name them, too; the message has the options to type.
         """
-        from tissuq.mechanics.user_law import UserCode
         from tissuq.studies.settings import is_inside
 
         if self.config is None:
             return
-        programs = {name: getattr(settings, name, None) for name in ("forward", "umbridge", "command")}
-        missing = [f"--{name} {shlex.quote(text)}" for name, text in programs.items()
-                   if text and not self.stated.get(name)]  # fmt: skip
-        for setting, typed in (("quantities", "--qoi"), ("along", "--along")):
-            for name, text in getattr(settings, setting, {}).items():
-                if UserCode.named(text) and name not in self.stated.get(setting, {}):
-                    missing.append(f"{typed} {shlex.quote(f'{name}={text}')}")
-        missing, inside = [] if is_dry else missing, self.beside.resolve()
+        missing, inside = list[str](), self.beside.resolve()
+        for setting, typed, text in settings.run_by_name() if not is_dry else ():
+            stated = self.stated.get(setting)
+            if not stated or (isinstance(stated, dict) and text.partition("=")[0] not in stated):
+                missing.append(f"{typed} {shlex.quote(text)}")
         if "also" not in self.stated and not all(is_inside(inside / file, inside) for file in settings.also):
             missing += [f"--also {shlex.quote(file)}" for file in settings.also]
         if missing:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import fields
 from functools import partial
 from math import inf
@@ -72,6 +73,18 @@ class ModelSettings(CardOptions):
         takes=list[Path],
         group=SOLVER,
     )
+
+    def run_by_name(self) -> Iterator[tuple[str, str, str]]:
+        """Yield programs, servers and functions that are run: the setting of each, its option, and what is typed."""
+        from tissuq.mechanics.user_law import UserCode
+
+        for setting in ("forward", "umbridge", "command"):
+            if text := getattr(self, setting, None):
+                yield setting, f"--{setting}", text
+        for setting, typed in (("quantities", "--qoi"), ("along", "--along")):
+            for name, text in getattr(self, setting, {}).items():
+                if UserCode.named(text):
+                    yield setting, typed, f"{name}={text}"
 
 
 class EnsembleSettings(ModelSettings):
