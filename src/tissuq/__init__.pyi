@@ -64,7 +64,7 @@ from tissuq.posterior.plots import plot_compare as plot_compare
 from tissuq.report.cards import write_cards as write_cards
 from tissuq.studies.calibrate import calibrate as calibrate
 from tissuq.studies.earlier_run import load as load, load_run as load_run
-from tissuq.studies.held_out import held_out_tests as held_out_tests
+from tissuq.studies.specimen import held_out_tests as held_out_tests
 from tissuq.studies.predict_run import predict_run as predict_run
 from tissuq.studies.prediction import Prediction as Prediction
 

@@ -15,7 +15,7 @@ import tissuq as tq
 from thick_tubes import fibres, rows_of, written
 from tissuq.cli.app import app
 from tissuq.errors import InputError
-from tissuq.studies.answers import answers_in, options_in
+from tissuq.studies.answers import answers_in, options_in, with_options
 from tissuq.studies.settings import load_settings
 from tissuq.studies.specimen import SpecimenSettings
 
@@ -134,6 +134,9 @@ def test_answers_are_the_options_of_a_message():
     ]
     texts = [answer.text for answer in answers_in("Give --mode for another, or leave --length out.", [], {})]
     assert texts == [f"--mode {name}" for name in tq.loading_modes()]
+    message = "to use the relaxed stress of each step give --relaxed; to leave the hold out, --leave-out 31:90."
+    assert [answer.text for answer in answers_in(message, [], {})] == ["--relaxed", "--leave-out 31:90"]
+    assert with_options({}, answers_in(message, [], {})[0]) == {"relaxed": True}
     (out,) = answers_in("Leave --length out.", [], {"dimensions": {"length": "2 mm"}})
     assert out.leaves_out == "length"
     with pytest.raises(InputError, match="cannot be understood"):

@@ -107,7 +107,7 @@ def test_a_folder_without_permission_is_refused_before_the_work(cli, here, speci
     assert "locked" in said.err
 
 
-PARTS = "recipe", "data", "json", "page"
+PARTS = "recipe", "csv", "json", "page"
 STEPS = [*(f"report.writer.write_{part}" for part in PARTS), "posterior.posterior.Posterior.save"]
 
 

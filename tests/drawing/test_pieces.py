@@ -19,7 +19,7 @@ def test_a_band_is_an_area_or_bars_at_points_that_follow_no_path(axis):
     (path,) = axis.collections[0].get_paths()
     corners = {tuple(vertex) for vertex in path.vertices.tolist()}
     assert corners == {*zip(x, low, strict=True), *zip(x, high, strict=True)}
-    pieces.band(axis, x, low, high, is_path=False)
+    pieces.band(axis, x, low, high, ways=[(slice(None), False)])
     bars = np.array(axis.collections[1].get_segments())
     np.testing.assert_array_equal(bars[:, :, 0].T, [x, x])
     np.testing.assert_array_equal(bars[:, :, 1].T, [low, high])

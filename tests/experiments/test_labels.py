@@ -10,7 +10,8 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from tissuq.report.run_folder import write_data
+from tissuq.report.tables import write_csv
+from tissuq.report.writer import data_file
 
 STRETCH = np.linspace(1, 1.3, 20)
 FACTORS = {"longitudinal": 1.0, "transverse": 1.5}
@@ -79,7 +80,7 @@ def test_words_in_the_name_of_a_file_say_them(tmp_path, name, labels):
 
 def test_they_are_written_with_the_data_and_kept_in_a_posterior(by_column, tmp_path):
     tests = tq.read_tests(by_column)
-    write_data(tmp_path, tq.Experiment.of(tests))
+    write_csv(tmp_path / "data.csv", data_file(tq.Experiment.of(tests))["data.csv"])
     with (tmp_path / "data.csv").open(newline="") as lines:
         cells = [(row["direction"], row["condition"]) for row in csv.DictReader(lines)]
     assert cells == [(name, "frozen") for name in FACTORS for _ in STRETCH]

@@ -193,7 +193,7 @@ def test_each_contradictory_test_is_predicted_by_the_model_of_all(monkeypatch):
         used.append(posterior := tq.fit(tests, **options))
         return posterior
 
-    monkeypatch.setattr("tissuq.studies.held_out.fit", spy)
+    monkeypatch.setattr("tissuq.studies.specimen.fit", spy)
     third = compressed_and_sheared(8.0)[0].labelled(name="second compression")
     shifted = tq.Experiment("uniaxial", third.stretch, 1.1 * third.stress, name="second compression")
     tq.held_out_tests([*compressed_and_sheared(8.0), shifted])

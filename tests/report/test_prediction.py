@@ -12,8 +12,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.assessment.uses import Use, Verdict
-from tissuq.report.prediction import prediction_figure, prediction_result
-from tissuq.report.prediction_tables import band_table, score_table
+from tissuq.report.prediction import band_table, prediction_figure, prediction_result, score_table
 from tissuq.report.result import Result
 from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted

@@ -8,7 +8,7 @@ import numpy as np
 
 from tissuq.finite_elements import PlateWithHole
 from tissuq.finite_elements.bodies import grid
-from tissuq.report.simulation_figures import write_collection, write_vtu
+from tissuq.report.finite_element_figures import write_collection, write_vtu
 
 
 def numbers(array):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -85,15 +85,19 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
         record["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
         texts = dict.fromkeys(text for inspection in inspections for text in inspection.warnings)
         record["findings"] = [_finding(text, columns, reading) for text in texts]
-        for (settings, of_test), mode in zip(tests, _modes_of(tests, files, modes), strict=True):
-            path = Path(settings["file"])
+        stated = dict(zip(files, modes, strict=True))
+        for settings, of_test in tests:
+            path, mode = Path(settings["file"]), stated.get(str(settings["file"]))
             for text in of_test.doubts:
                 if text not in [question["text"] for question in record["questions"]]:
                     doubt = _question(path, text, columns, {**reading, "mode": mode}, len(files), start)
                     record["questions"] += [doubt | {"file": str(path)}] if doubt["answers"] else []
         silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
         if silent:
-            answers = [_plain_mode(mode.name, mode.description) for mode in modes_of_specimens()]
+            answers = [
+                {"label": mode.name, "gives": mode.description, "settings": {"mode": mode.name}, "asked_for": []}
+                for mode in modes_of_specimens()
+            ]
             record["questions"].append({"text": MODE, "plain": MODE, "answers": answers, "shown": 1, "file": silent[0]})
     return record
 
@@ -103,17 +107,6 @@ def modes_of_specimens() -> list[LoadingMode]:
     kinds = loading_modes()
     along_axis_2 = [f"{name}@2" for name, kind in kinds.items() if kind.has_axis]
     return [loading_mode(name) for name in (*kinds, *along_axis_2)]
-
-
-def _modes_of(
-    tests: Sequence[tuple[dict[str, Any], Reading]], files: Sequence[str], modes: Sequence[str | None]
-) -> Iterator[str | None]:
-    stated = dict(zip(files, modes, strict=True))
-    return (stated.get(str(settings["file"])) for settings, _ in tests)
-
-
-def _plain_mode(name: str, description: str) -> dict[str, Any]:
-    return {"label": name, "gives": description, "settings": {"mode": name}, "asked_for": []}
 
 
 def _table(table: Table) -> dict[str, Any]:

@@ -6,15 +6,13 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from tissuq.studies.measured_file import ReadingSettings
+from tissuq.studies.option import slots_of
+
 __all__ = ["Repeat", "command", "fit_lines", "reading_words"]
 
 Repeat = dict[str, str]
 """A ``shell`` command and lines of ``python``."""
-SWITCHES = {("compression_positive", True): "--compression-positive", ("until_peak", True): "--until-peak"}
-SWITCHES |= {("incompressible", True): "--incompressible", ("relaxed", True): "--relaxed"}
-SWITCHES |= {("compression_positive", False): "--tension-positive"}
-"""Options without a value, by setting and its value."""
-OF_PAIRS = {"columns": "--column", "only": "--only", "tolerances": "--tolerance"}
 OF_FILES = ("file", "name", "specimen", "direction", "condition", "noise_sd")
 """Settings of a test that are no options of reading."""
 FIT_OPTIONS = ("material", "laws", "discrepancies", "noise_sd", "noise", "estimand", "stable_in", "method", "seed")
@@ -49,17 +47,17 @@ def reading_words(reading: Mapping[str, Any]) -> list[str]:
     ['--column', 'stress=P', '--length', '20 mm', '--stretch', '1:1.2']
     """
     words: list[str] = []
-    for name, value in reading.items():
-        if name == "dimensions":
-            words += [word for size, text in (value or {}).items() for word in (f"--{size}", text)]
-        elif name in OF_PAIRS:
-            words += [word for key, item in (value or {}).items() for word in (OF_PAIRS[name], f"{key}={item}")]
-        elif name == "stretch_range" and value is not None:
-            words += ["--stretch", ":".join(f"{end:.12g}" for end in value)]
-        elif isinstance(value, bool):
-            words += [SWITCHES[name, value]] if (name, value) in SWITCHES else []
+    for slot in slots_of(ReadingSettings):
+        value = reading.get(slot.path[0])
+        value = (value or {}).get(slot.path[1]) if slot.path[1:] else value
+        if isinstance(value, bool):
+            words += [slot.typed] if value else [f"--{slot.option.negative}"] * bool(slot.option.negative)
+        elif isinstance(value, Mapping):
+            words += [word for key, item in value.items() for word in (slot.typed, f"{key}={item}")]
+        elif isinstance(value, tuple | list):
+            words += [slot.typed, ":".join(f"{end:.12g}" for end in value)]
         elif value is not None:
-            words += [f"--{name.replace('_', '-')}", str(value)]
+            words += [slot.typed, str(value)]
     return words
 
 

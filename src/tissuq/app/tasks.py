@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -12,6 +13,7 @@ from tissuq.studies.files_of_tests import measured, run_name
 from tissuq.studies.option_texts import column
 
 if TYPE_CHECKING:
+    from tissuq.report.result import Result
     from tissuq.studies.specimen import SpecimenStudy
 
 __all__ = ["TASKS", "Say", "warm_up"]
@@ -66,11 +68,9 @@ def inspect(request: Mapping[str, Any], say: Say) -> None:
 def fit(request: Mapping[str, Any], say: Say) -> None:
     """Fit a material; say the answer as soon as it is there, then write the run."""
     from tissuq.report.result import few_and_others
-    from tissuq.report.run_folder import run_folder
     from tissuq.report.specimen import specimen_answer, specimen_result
-    from tissuq.report.writer import write_result
+    from tissuq.studies.fit_settings import SpecimenSettings
     from tissuq.studies.specimen import run_specimen
-    from tissuq.studies.specimen_settings import SpecimenSettings
 
     say("step", "reading")
     values, readings, name = _measured(request)
@@ -93,20 +93,15 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
         say("answer", {**record, **of_page})
 
     study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=readings, early=say_answer)
-    say("step", "writing the report")
-    with run_folder(RUNS / name, "fit", force=True) as folder:
-        write_result(specimen_result(study, _sources(settings)), folder, target=RUNS / name)
-    say("done", {"run": name, "report": f"runs/{name}/report.html"})
+    say("done", _written("fit", RUNS / name, partial(specimen_result, study, _sources(settings)), say))
 
 
 def laws(request: Mapping[str, Any], say: Say) -> None:
     """Compare laws; say their table, and write the run."""
     from tissuq.report.laws import law_lead, law_result, law_table
-    from tissuq.report.run_folder import run_folder
-    from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
+    from tissuq.studies.fit_settings import LawSettings
     from tissuq.studies.laws import run_laws
-    from tissuq.studies.specimen_settings import LawSettings
 
     say("step", "reading")
     values, readings, name = _measured(request)
@@ -114,12 +109,9 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     settings = _settings(LawSettings, values | options)
     study = run_laws(settings, Path(), lambda text: say("step", text), found=readings)
     folder_name = f"{name}-laws"
-    say("step", "writing the report")
-    with run_folder(RUNS / folder_name, "fit", force=True) as folder:
-        write_result(law_result(study, _sources(settings)), folder, target=RUNS / folder_name)
-    shell = _shell(
-        "fit", *_files(request), {"specimen": _specimens(request)} | options | {"out": f"runs/{folder_name}"}
-    )
+    written = _written("fit", RUNS / folder_name, partial(law_result, study, _sources(settings)), say)
+    values_of_run = {"specimen": _specimens(request)} | options | {"out": f"runs/{folder_name}"}
+    shell = _shell("fit", *_files(request), values_of_run)
     table = law_table(study)
     say(
         "done",
@@ -129,19 +121,15 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
             "rows": table.rows,
             "skipped": dict(study.skipped),
             "warnings": [{"severity": w.severity, "text": in_shell(w)} for w in study.warnings],
-            "run": folder_name,
-            "report": f"runs/{folder_name}/report.html",
             "repeat": {"shell": shell, "python": fit_lines(values | options, study.experiment.stress_unit)},
-        },
+        }
+        | written,
     )
 
 
 def predict(request: Mapping[str, Any], say: Say) -> None:
     """Predict another loading mode from a run; say the bands, and write the folder."""
-    from tissuq.report.prediction import prediction_result
-    from tissuq.report.prediction_tables import band_table
-    from tissuq.report.run_folder import run_folder
-    from tissuq.report.writer import write_result
+    from tissuq.report.prediction import band_table, prediction_result
     from tissuq.result_warning import in_shell
     from tissuq.studies.predict_run import run_prediction
     from tissuq.studies.run_settings import PredictionSettings
@@ -151,9 +139,7 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
     settings = _settings(PredictionSettings, {"run": run.as_posix(), **options})
     prediction = run_prediction(settings, Path(), lambda text: say("step", text))
     target = RUNS / f"{run.name}-{prediction.mode.name}"
-    say("step", "writing the report")
-    with run_folder(target, "predict", force=True) as folder:
-        write_result(prediction_result(prediction, settings, target), folder)
+    written = _written("predict", target, partial(prediction_result, prediction, settings, target), say)
     points, table = settings.points_of(prediction.mode.name), band_table(prediction)
     python = [*_imports(points), f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'
               f"{_points_in_python(settings, points)})", "print(prediction.table)"]  # fmt: skip
@@ -164,16 +150,14 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
             "rows": table.rows,
             "title": table.title,
             "warnings": list(map(in_shell, prediction.warnings)),
-            "run": target.name,
-            "report": f"{target.as_posix()}/report.html",
             "repeat": {"shell": command("predict", [run.as_posix()], options), "python": "\n".join(python)},
-        },
+        }
+        | written,
     )
 
 
 def export(request: Mapping[str, Any], say: Say) -> None:
     """Write draws of a run as material cards; say the files and what they are."""
-    from tissuq.export import CardSettings
     from tissuq.export.cards import calibrated_stretches
     from tissuq.report.cards import write_cards
     from tissuq.report.source_run import said_by
@@ -182,14 +166,13 @@ def export(request: Mapping[str, Any], say: Say) -> None:
     format, draws, seed = str(request["format"]), int(request.get("draws") or 20), int(request.get("seed") or 0)
     run, unit = RUNS / _run_name(request), str(request.get("unit") or "MPa")
     keep_all = bool(request.get("all_draws"))
-    settings = CardSettings(unit=unit)
     target = CARDS / f"{run.name}-{format}"
     say("step", "drawing")
     posterior = load(run)
     ensemble, said = posterior.ensemble(draws, seed, admissible=not keep_all), said_by(run, posterior.model)
     say("step", "writing the cards")
-    source = f"run {run.name} of tissuq, sobol draws from seed {seed}" + f"; {said.of_cards}" * bool(said.use)
-    cards = write_cards(ensemble, target, format, force=True, source=source, unit=settings.unit)
+    source = said.source_of_cards(run, "sobol", seed)
+    cards = write_cards(ensemble, target, format, force=True, source=source, unit=unit)
     options = {"format": format, "draws": draws, "unit": unit, "seed": seed, "all_draws": keep_all}
     drawn = f"{draws}, seed={seed}" + (", admissible=False" if keep_all else "")
     python = [
@@ -264,6 +247,17 @@ def _settings(kind: Any, values: dict[str, Any]) -> Any:
     from tissuq.studies.settings import load_settings
 
     return load_settings(kind, None, values, rivals=("noise", "noise_sd"))
+
+
+def _written(verb: str, target: Path, result_of: Callable[[], Result], say: Say) -> dict[str, str]:
+    """Write what has come of a command as a run; return what the page is told of it."""
+    from tissuq.report.run_folder import run_folder
+    from tissuq.report.writer import write_result
+
+    say("step", "writing the report")
+    with run_folder(target, verb, force=True) as folder:
+        write_result(result_of(), folder, target=target)
+    return {"run": target.name, "report": f"{target.as_posix()}/report.html"}
 
 
 def _sources(settings: Any) -> list[Path]:

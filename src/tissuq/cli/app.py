@@ -9,19 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from tissuq.cli import (
-    calibrate,
-    catalogue,
-    ensemble,
-    fit,
-    inspect,
-    of_run,
-    population,
-    project,
-    show,
-    structure,
-    study,
-)
+from tissuq.cli import catalogue, finite_elements, fit, inspect, of_run, project, show, study
 from tissuq.cli.command import Command
 from tissuq.cli.progress import INTERRUPTED, TERMINATED, Stopped, end_on_request
 from tissuq.errors import TissuqError
@@ -77,9 +65,9 @@ COMMANDS: dict[str, dict[str, Any]] = {
     },
     "After a fit": {
         "predict": of_run.predict, "compare": show.compare, "design": of_run.design, "export": of_run.export,
-        "structure": structure.structure, "ensemble": ensemble.ensemble,
+        "structure": finite_elements.structure, "ensemble": finite_elements.ensemble,
     },
-    "Several specimens, expensive models": {"population": population.population, "calibrate": calibrate.calibrate},
+    "Several specimens, expensive models": {"population": fit.population, "calibrate": fit.calibrate},
     "How far to trust it": {"paper": study.paper, "check": catalogue.check},
     "What there is": {
         "materials": catalogue.materials, "modes": catalogue.modes, "discrepancies": catalogue.discrepancies,
@@ -91,7 +79,7 @@ for heading, commands in COMMANDS.items():
     for name, function in commands.items():
         app.command(name, cls=Command, rich_help_panel=heading)(function)
 app.add_typer(study.study, rich_help_panel="How far to trust it")
-app.command("simulate", cls=Command, hidden=True, deprecated=True)(structure.structure)
+app.command("simulate", cls=Command, hidden=True, deprecated=True)(finite_elements.structure)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""A command as it was typed, and how it is carried out: settings, run, folder."""
+"""A command as it was typed, with options on which no number depends, and how it is carried out, in what folder."""
 
 from __future__ import annotations
 
@@ -14,17 +14,84 @@ from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
 import typer
 
 from tissuq.cli.progress import Monitor
-from tissuq.cli.running import Configured, IntoFolder, LawOfRun, Running, Written
 from tissuq.errors import InputError
-from tissuq.studies.option import Settings
-from tissuq.studies.settings import load_settings
+from tissuq.studies.option import Settings, option
+from tissuq.studies.settings import RECIPE, load_settings
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from tissuq.mechanics import Material
     from tissuq.report.result import Record, Result
-    from tissuq.studies.model_settings import ModelSettings
+    from tissuq.studies.finite_element_settings import ModelSettings
 
-__all__ = ["Call", "not_converged"]
+__all__ = [
+    "SCHEDULER", "Call", "Campaign", "Configured", "IntoFolder", "LawOfRun", "OfRun", "Running", "SolverOptions",
+    "Verbosity", "Written", "check_folder", "not_converged", "write_campaign_recipe",
+]  # fmt: skip
+
+SCHEDULER = "Address of a Dask scheduler to use instead, or slurm:memory=4GB,walltime=02:00:00 for batch jobs."
+
+
+class Running(Settings):
+    """Options of a command on which its numbers do not depend."""
+
+
+class Verbosity(Running):
+    """A command that says as much as is asked for."""
+
+    quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.", letter="q")
+    verbose: bool = option(False, "Tell how long every stage took.")
+
+
+class Configured(Verbosity):
+    """A command that an earlier recipe repeats."""
+
+    config: Path | None = option(None, "run.toml of an earlier run to repeat.")
+
+
+class IntoFolder(Running):
+    """A command that writes a folder, whole or not at all."""
+
+    out: Path | None = option(None, "Folder for the run [runs/NAME].")
+    force: bool = option(False, "Replace an existing folder of the same kind.")
+
+
+class Written(IntoFolder, Configured):
+    """A command whose folder is a run, with its figures and its recipe."""
+
+    figures: bool = option(True, "Draw the figures.")
+
+
+class LawOfRun(Running):
+    """A command that begins from a run of ``tissuq fit``."""
+
+    user_law: str | None = option(
+        None, "law.py:Name of the run, if its material is your own law; its code runs only if named here."
+    )
+
+
+class OfRun(LawOfRun, Written):
+    """A command that begins from such a run, and writes a folder."""
+
+
+class SolverOptions(Running):
+    """A command that runs the solver of the user's own finite-element model."""
+
+    max_jobs: int | None = option(None, "Runs of the solver at a time, as many as licences [one a core].", ge=1)
+    timeout: float | None = option(None, "Seconds after which the solver is stopped [never].", unit="s", ge=0)
+    retries: int = option(0, "Times that a failed run of the solver is made again, as for a licence.", ge=0)
+    abaqus: str = option("", "Program that opens .odb files, as its 'python' [first word of --command].")
+
+
+class Campaign(Configured):
+    """A command whose folder grows, and which goes on where it was stopped."""
+
+    config: Path | None = option(None, "TOML file of the campaign.")
+    out: Path | None = option(None, "Folder of the campaign [runs/NAME].")
+    workers: int = option(1, "Processes on this machine.", ge=1)
+    scheduler: str | None = option(None, SCHEDULER)
+
 
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound=Running)
@@ -110,19 +177,15 @@ class Call(Generic[Kind, How]):
         InputError
             When the command line does not name them, too; the message has the options to type.
         """
-        from tissuq.mechanics.user_law import UserCode
         from tissuq.studies.settings import is_inside
 
         if self.config is None:
             return
-        programs = {name: getattr(settings, name, None) for name in ("forward", "umbridge", "command")}
-        missing = [f"--{name} {shlex.quote(text)}" for name, text in programs.items()
-                   if text and not self.stated.get(name)]  # fmt: skip
-        for setting, option in (("quantities", "--qoi"), ("along", "--along")):
-            for name, text in getattr(settings, setting, {}).items():
-                if UserCode.named(text) and name not in self.stated.get(setting, {}):
-                    missing.append(f"{option} {shlex.quote(f'{name}={text}')}")
-        missing, inside = [] if is_dry else missing, self.beside.resolve()
+        missing, inside = list[str](), self.beside.resolve()
+        for setting, typed, text in settings.run_by_name() if not is_dry else ():
+            stated = self.stated.get(setting)
+            if not stated or (isinstance(stated, dict) and text.partition("=")[0] not in stated):
+                missing.append(f"{typed} {shlex.quote(text)}")
         if "also" not in self.stated and not all(is_inside(inside / file, inside) for file in settings.also):
             missing += [f"--also {shlex.quote(file)}" for file in settings.also]
         if missing:
@@ -223,3 +286,59 @@ def not_converged(names: list[str]) -> None:
             err=True,
         )
         raise typer.Exit(NOT_CONVERGED)
+
+
+MAX_LETTERS = 300
+"""Of what is said of settings that differ."""
+
+
+def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = frozenset()) -> None:
+    """Refuse a folder that is not empty, unless it is that of the same campaign.
+
+    Settings that are ``free`` may be others than before.
+
+    Raises
+    ------
+    InputError
+        When it is neither.
+    """
+    from tissuq.studies.stream import unfinished
+
+    recipe = folder / RECIPE
+    if not folder.exists() or (
+        folder.is_dir() and {path.name for path in folder.iterdir()} <= {unfinished(recipe).name}
+    ):
+        return
+    if not recipe.exists():
+        raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
+    stored, wanted = _without(recipe.read_text(encoding="utf-8"), free), _without(_recipe(settings), free)
+    if stored != wanted:
+        names = [name for name in {**stored, **wanted} if stored.get(name) != wanted.get(name)]
+        said = ", ".join(f"{name}: {stored.get(name, 'none')} there, {wanted.get(name, 'none')} here" for name in names)
+        raise InputError(
+            f"'{folder}' holds a campaign with other settings ({said:.{MAX_LETTERS}}): choose another folder (--out)."
+        )
+
+
+def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
+    """Write the recipe atomically, so that a killed campaign can be resumed."""
+    from tissuq.studies.stream import write_whole
+
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / RECIPE, _recipe(settings))
+
+
+def _without(recipe: str, names: frozenset[str]) -> dict[str, Any]:
+    """Return the settings of a recipe without some of them, none where it is damaged."""
+    import tomllib
+
+    try:
+        return {name: value for name, value in tomllib.loads(recipe).items() if name not in names}
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def _recipe(settings: BaseModel) -> str:
+    import tomli_w
+
+    return tomli_w.dumps(settings.model_dump(mode="json", exclude_none=True))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tissuq.cli.call import Call
+from tissuq.cli.call import Call, Running
 from tissuq.cli.command import CONFIGURED, command, settings_of
-from tissuq.cli.running import Running
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import wrapped
 from tissuq.studies.option import Settings, argument, slots_of

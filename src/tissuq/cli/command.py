@@ -13,9 +13,8 @@ from typing import Annotated, Any, TypeVar
 import typer
 from typer.core import TyperCommand
 
-from tissuq.cli.call import Call
+from tissuq.cli.call import Call, Running, Verbosity
 from tissuq.cli.progress import Monitor, stopping
-from tissuq.cli.running import Running, Verbosity
 from tissuq.studies.option import Settings, Slot, slots_of, stated
 from tissuq.studies.settings import imported, load_settings
 

@@ -1,23 +1,24 @@
-"""``tissuq fit``: a material, or several, from the measured files of a user."""
+"""``tissuq fit``, ``population`` and ``calibrate``: parameters from the measured files of a user."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from filecmp import cmp
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tissuq.cli.call import Call, not_converged
+from tissuq.cli.call import Call, SolverOptions, Written, not_converged
 from tissuq.cli.command import command
-from tissuq.cli.running import Written
 from tissuq.errors import InputError
+from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.files_of_tests import files_of, measured, run_name
+from tissuq.studies.fit_settings import ALL, LawSettings, PopulationSettings, SpecimenSettings
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import option
 from tissuq.studies.settings import setting_of
-from tissuq.studies.specimen_settings import ALL, LawSettings, SpecimenSettings
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["fit"]
+__all__ = ["calibrate", "fit", "population"]
 
 
 class FitOptions(Written):
@@ -144,3 +145,57 @@ def _check_same(file: Path, named: Path, config: Path) -> None:
             f"FILE '{file}' is not the file that '{config}' names, '{named}'. Leave FILE out to repeat that run, or "
             "leave --config out to fit FILE."
         )
+
+
+@command(PopulationSettings, Written, out="Folder for the run [runs/population].")
+def population(call: Call[PopulationSettings, Written]) -> None:
+    """Identify a population from its specimens, every specimen within it, and what to expect of a new specimen."""
+    from tissuq.mechanics import material_named
+    from tissuq.report.population import population_result
+    from tissuq.studies.population import run_population
+
+    call.check_source("files", "the FILES of several specimens, folders of them", "run")
+    settings, material = call.loaded(rivals=("noise", "noise_sd")), call.stated.get("material")
+    law = material_named(material, laws=True) if material else None
+    target = call.target(Path("runs") / "population")
+    study = call.carried_out(
+        target,
+        lambda step: run_population(settings, call.beside, step, law),
+        partial(population_result, beside=call.beside),
+    )
+    not_converged([] if study.population.converged else ["the population"])
+
+
+class CalibrateOptions(SolverOptions, Written):
+    """How the model is run."""
+
+    workers: int = option(1, "Processes that run the model.", ge=1)
+    keep: bool = option(False, "Keep the solver's files of every run.")
+    runs_in: Path | None = option(
+        None, "Folder of the runs of the model, which a repeated command reuses [OUT-forward-runs]."
+    )
+
+
+@command(CalibrationSettings, CalibrateOptions)
+def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
+    """Identify the parameters of an expensive model, using an emulator whose error is included."""
+    from tissuq.report.calibration import calibration_result
+    from tissuq.studies.calibration import run_calibration
+
+    call.check_source("files", "a FILE of controls and measured values", "run")
+    if not (call.config or "priors" in call.stated or "prior_run" in call.stated):
+        raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5), or --prior-run.")
+    settings = call.loaded(rivals=("forward", "umbridge"))
+    call.check_named_again(settings)
+    target = call.target(Path("runs") / Path(settings.files[0]).stem)
+    runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
+    how, running = call.how, dict[str, Any]()
+    workers = how.workers
+    if settings.models:
+        workers = how.max_jobs or os.cpu_count() or 1
+        running = {"timeout": how.timeout, "retries": how.retries, "keep": how.keep, "abaqus": how.abaqus}
+    with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
+        study = run_calibration(settings, call.beside, runs_in=runs_in, workers=workers, step=step, **running)
+    print(f"Forward runs: {runs_in}")
+    call.carried_out(target, lambda step: study, lambda study: calibration_result(study, call.beside))
+    not_converged([] if study.calibration.converged else ["the calibration"])

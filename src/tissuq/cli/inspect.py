@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.cli.call import Call
+from tissuq.cli.call import Call, IntoFolder
 from tissuq.cli.command import command
-from tissuq.cli.running import IntoFolder
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.numbers import wrapped
 from tissuq.studies.answers import DIMENSIONS, Answer, answers_in, options_in, with_options

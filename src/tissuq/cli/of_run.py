@@ -6,12 +6,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from tissuq.cli.call import Call, not_converged
+from tissuq.cli.call import Call, IntoFolder, LawOfRun, OfRun, not_converged
 from tissuq.cli.command import command
-from tissuq.cli.running import IntoFolder, LawOfRun, OfRun
 from tissuq.errors import InputError
 from tissuq.studies.files_of_tests import resolve
-from tissuq.studies.model_settings import CardOptions
+from tissuq.studies.finite_element_settings import CardOptions
 from tissuq.studies.option import option, sampling
 from tissuq.studies.run_settings import DesignSettings, PredictionSettings, RunSettings
 from tissuq.studies.settings import seen_from
@@ -115,8 +114,7 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     spread = cast("Sampling", settings.sampling)
     ensemble = posterior.ensemble(settings.draws, settings.seed, spread, admissible=not settings.all_draws)
     said = said_by(run, posterior.model)
-    source = f"run {run.resolve().name} of tissuq, {spread} draws from seed {settings.seed}"
-    source += f"; {said.of_cards}" * bool(said.use)
+    source = said.source_of_cards(run, spread, settings.seed)
     cards = write_cards(ensemble, target, settings.format, force=call.how.force, **of_cards | {"source": source})
     if use := said.use:
         print_uses([{"purpose": use.purpose, "verdict": use.verdict, "reason": use.reason}])

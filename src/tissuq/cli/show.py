@@ -6,9 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.cli.call import Call
+from tissuq.cli.call import Call, IntoFolder, Verbosity
 from tissuq.cli.command import command
-from tissuq.cli.running import IntoFolder, Verbosity
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.settings import DAMAGE

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tissuq.cli.call import Call, not_converged
-from tissuq.cli.campaign import check_folder, write_campaign_recipe
+from tissuq.cli.call import Call, Campaign, Written, check_folder, not_converged, write_campaign_recipe
 from tissuq.cli.command import Command, command
-from tissuq.cli.running import Campaign, Written
 from tissuq.errors import InputError
 from tissuq.studies.campaign_settings import (
     CoverageOptions,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tissuq.arrays import BoolArray, FloatArray
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.drawing.style import BAND, BASE, INK, relative_size
 
 if TYPE_CHECKING:
@@ -20,6 +20,9 @@ __all__ = ["band", "cut_off", "density", "forest", "heat", "line", "outside", "p
 
 EDGE = "end of the measured strains"
 """What the dashed line is where a hatched part begins."""
+Ways = Sequence[tuple[IndexArray | slice, bool]]
+"""Indices of points in the order in which they are drawn, and whether as a curve or by themselves."""
+ONE_PATH: Ways = ((slice(None), True),)
 MAX_POINTS, BINS = 5000, 120
 """Measurements that are drawn one by one, and bins in which more of them are summed up."""
 
@@ -33,14 +36,17 @@ def band(
     color: str = BAND,
     strength: float = 0.22,
     label: str = "",
-    is_path: bool = True,
+    ways: Ways = ONE_PATH,
 ) -> None:
-    """Draw what lies between two values: as one area, or as bars at points that follow no path."""
-    if is_path:
-        axis.fill_between(np.asarray(x), np.asarray(low), np.asarray(high), color=color, alpha=strength, lw=0,
-                          label=label)  # fmt: skip
-    else:
-        axis.vlines(x, low, high, color=color, alpha=strength, lw=5 * relative_size(), label=label)
+    """Draw what lies between two values: as an area along each way, or as bars at points that follow no path."""
+    x, low, high = np.asarray(x), np.asarray(low), np.asarray(high)
+    for indices, is_path in ways:
+        ends = x[indices], low[indices], high[indices]
+        if is_path:
+            axis.fill_between(*ends, color=color, alpha=strength, lw=0, label=label)
+        else:
+            axis.vlines(*ends, color=color, alpha=strength, lw=5 * relative_size(), label=label)
+        label = ""
 
 
 def line(
@@ -50,15 +56,18 @@ def line(
     *,
     color: str = BAND,
     label: str = "",
-    is_path: bool = True,
+    ways: Ways = ONE_PATH,
     style: str = "-",
     width: float = 1.6,
     **options: Any,
 ) -> None:
-    """Draw a curve, or marks at points that follow no path."""
-    size = relative_size()
-    looks: dict[str, Any] = {"ls": style, "lw": width * size} if is_path else {"ls": "", "marker": "_", "ms": 7 * size}
-    axis.plot(np.asarray(x), np.asarray(y), color=color, label=label, **looks, **options)
+    """Draw a curve along each way, or marks at points that follow no path."""
+    x, y, size = np.asarray(x), np.asarray(y), relative_size()
+    of_path, of_points = {"ls": style, "lw": width * size}, {"ls": "", "marker": "_", "ms": 7 * size}
+    for indices, is_path in ways:
+        looks: dict[str, Any] = of_path if is_path else of_points
+        axis.plot(x[indices], y[indices], color=color, label=label, **looks, **options)
+        label = ""
 
 
 def points(

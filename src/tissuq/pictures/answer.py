@@ -105,10 +105,9 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     with small_panels(1) as (figure, drawn):
         (axis,) = drawn.axes
         abscissa = curve.drawn_at(across)
-        for indices, is_curve in ways_of(curve.mode, across, abscissa):
-            band(axis, abscissa[indices], within(low[indices], limits), within(high[indices], limits),
-                 is_path=is_curve)  # fmt: skip
-            line(axis, abscissa[indices], median[indices], is_path=is_curve)
+        ways = ways_of(curve.mode, across, abscissa)
+        band(axis, abscissa, within(low, limits), within(high, limits), ways=ways)
+        line(axis, abscissa, median, ways=ways)
         points(axis, curve.drawn_at(), measured, is_back=curve.is_back)
         axis.set_ylim(limits)
         end = f" [{unit.name}]{count}"
@@ -133,16 +132,15 @@ def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     lines = [(described.stress, BAND, "-", "stress, median")]
     material = described.solution.model.material.name
     lines += [(material_stress, TRUTH, "--", f"{material} alone{f', {percent}' * is_one}")] if material_stress else []
-    for number, (indices, is_curve) in enumerate(described.ways):
-        for shown, strength, color, label in bands:
-            low, high = (within(end[indices] / unit.to_mpa, limits) for end in (shown.low, shown.high))
-            band(axis, described.abscissa[indices], low, high, color=color, strength=strength, is_path=is_curve,
-                 label="" if number else label)  # fmt: skip
-        for shown, color, style, label in lines:
-            median = within(shown.median[indices] / unit.to_mpa, limits)
-            line(axis, described.abscissa[indices], median, color=color, style=style, width=1.3, is_path=is_curve,
-                 label="" if number else label)  # fmt: skip
-        rows = slice(None) if is_one else described.measured_rows[number]
+    abscissa, ways = described.abscissa, described.ways
+    for shown, strength, color, label in bands:
+        low, high = (within(end / unit.to_mpa, limits) for end in (shown.low, shown.high))
+        band(axis, abscissa, low, high, color=color, strength=strength, ways=ways, label=label)
+    for shown, color, style, label in lines:
+        median = within(shown.median / unit.to_mpa, limits)
+        line(axis, abscissa, median, color=color, style=style, width=1.3, ways=ways, label=label)
+    rows_of_ways: list[Any] = [slice(None)] if is_one else described.measured_rows
+    for number, rows in enumerate(rows_of_ways):
         points(axis, curve.drawn_at()[rows], measured[rows], error=error[rows], label="" if number else "measured",
                marker=MARKERS[number % len(MARKERS)], is_back=curve.is_back[rows])  # fmt: skip
     axis.set_ylim(limits)
@@ -183,11 +181,10 @@ def _draw_share(axis: Axes, solution: Solution, curve: Any, prob: float) -> None
     low, median, high = 100 * shares
     axis.axhline(0, color=BASE, lw=0.8 * relative_size(), zorder=0.5)
     axis.set_ylim(_share_limits(low, high))
-    for number, (indices, is_curve) in enumerate(ways):
-        low_end, middle, high_end = (np.clip(end[indices], -MOST_SHARE, MOST_SHARE) for end in (low, median, high))
-        band(axis, abscissa[indices], low_end, high_end, color=INK, strength=0.2, is_path=is_curve,
-             label="" if number else f"{100 * prob:.4g} % of the share")  # fmt: skip
-        line(axis, abscissa[indices], middle, color=INK, width=1.2, is_path=is_curve, label="" if number else "median")
+    low_end, middle, high_end = (np.clip(end, -MOST_SHARE, MOST_SHARE) for end in (low, median, high))
+    words = f"{100 * prob:.4g} % of the share"
+    band(axis, abscissa, low_end, high_end, color=INK, strength=0.2, ways=ways, label=words)
+    line(axis, abscissa, middle, color=INK, width=1.2, ways=ways, label="median")
 
 
 def _share_limits(low: Any, high: Any) -> tuple[float, float]:

@@ -12,6 +12,7 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.tube import SAME_STRETCH, rows_at_each_stretch
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
@@ -39,8 +40,6 @@ RETURN, JUMP, MOST_WAYS = 0.3, 5.0, 7
 and the most paths of a picture."""
 NEARLY = 0.02
 """Changes of a control that do not count, over its range."""
-SAME_HELD = 0.01
-"""Difference of a control up to which it is held at one value."""
 NO_STRESS = 0.02
 """Stress over the largest one of a curve, below which there is no share of it."""
 
@@ -191,16 +190,15 @@ def rows_where_held(mode: LoadingMode, points: FloatArray) -> list[IndexArray]:
     if not (len(mode.stresses) == 1 and len(mode.controls) == 2):
         return []
     column = points[:, 1]
-    order = np.argsort(column, kind="stable")
-    groups = np.split(order, 1 + np.flatnonzero(np.diff(column[order]) > SAME_HELD))
-    are_held = all(np.ptp(column[rows]) <= 2 * SAME_HELD for rows in groups)
+    groups = rows_at_each_stretch(column)
+    are_held = all(np.ptp(column[rows]) <= 2 * SAME_STRETCH for rows in groups)
     return groups if are_held and len(groups) <= MOST_WAYS else []
 
 
 def held_along(mode: LoadingMode, points: FloatArray) -> str:
     """Return at which value one of several controls is held along a path, in words; nothing where none is."""
     pairs = zip(mode.controls, np.transpose(points), strict=True) if points.ndim > 1 else ()
-    held = (f"{control.name} {column.mean():.4g}" for control, column in pairs if np.ptp(column) <= 2 * SAME_HELD)
+    held = (f"{control.name} {column.mean():.4g}" for control, column in pairs if np.ptp(column) <= 2 * SAME_STRETCH)
     return next(held, "")
 
 

@@ -191,16 +191,14 @@ def draw_predicted(
     """Draw bands, measurements and where nothing was measured; ``limits`` of the stress are in MPa."""
     scale, percent, abscissa = unit.to_mpa, f"{100 * prob:.4g} %", predicted.abscissa
     ends = limits[0] / scale, limits[1] / scale
-    for number, (indices, is_curve) in enumerate(predicted.ways):
-        for interval, strength, label in (
-            (predicted.measurements, 0.18, f"{percent} of measurements"),
-            (predicted.stress, 0.38, f"{percent} of the stress"),
-        ):
-            low, high = within(interval.low[indices] / scale, ends), within(interval.high[indices] / scale, ends)
-            label = "" if number else label
-            band(axis, abscissa[indices], low, high, strength=strength, label=label, is_path=is_curve)
-        median = within(predicted.stress.median[indices] / scale, ends)
-        line(axis, abscissa[indices], median, label="" if number else "predicted median", is_path=is_curve)
+    for interval, strength, label in (
+        (predicted.measurements, 0.18, f"{percent} of measurements"),
+        (predicted.stress, 0.38, f"{percent} of the stress"),
+    ):
+        low, high = within(interval.low / scale, ends), within(interval.high / scale, ends)
+        band(axis, abscissa, low, high, strength=strength, label=label, ways=predicted.ways)
+    median = within(predicted.stress.median / scale, ends)
+    line(axis, abscissa, median, label="predicted median", ways=predicted.ways)
     margin = 0.02 * max(float(np.ptp(abscissa)), 0.1 * abs(float(abscissa.max())))
     axis.set_xlim(abscissa.min() - margin, abscissa.max() + margin)
     axis.set_ylim(ends)

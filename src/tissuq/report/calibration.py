@@ -13,7 +13,6 @@ from tissuq.decks.quantity import located
 from tissuq.emulation import DeckForward, SeveralModels
 from tissuq.emulation.problem import symbol_of
 from tissuq.experiments.units import stress_unit
-from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.noise import NOISE_SD
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
@@ -105,16 +104,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
 
 def _repeated(settings: CalibrationSettings) -> str:
     """Return the command that repeats a run of stored settings, with what must be named again."""
-    words = []
-    if settings.forward:
-        words = ["--forward", settings.forward]
-    elif settings.umbridge:
-        words = ["--umbridge", settings.umbridge]
-    elif settings.command:
-        words = ["--command", settings.command]
-    for option, texts in (("--qoi", settings.quantities), ("--along", settings.along)):
-        words += [word for name, text in texts.items() if LAW.fullmatch(text) for word in (option, f"{name}={text}")]
-    return shlex.join(["calibrate", *words])
+    return shlex.join(["calibrate", *(word for _, option, text in settings.run_by_name() for word in (option, text))])
 
 
 def _copies(study: CalibrationStudy, beside: Path) -> tuple[Copies, dict[str, Any]]:

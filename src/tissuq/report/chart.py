@@ -98,19 +98,18 @@ def chart_data(
     """
     described = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     posterior = posteriors[main]
-    tests = [*_measured(described[main]), *_others(posterior)]
+    drawn = {name: list(_measured(described[name])) for name in sorted(posteriors, key=lambda name: name != main)}
+    drawn[main] += _others(posterior)
     sliders = _Sliders(posterior, unit)
-    views = []
-    for name in sorted(posteriors, key=lambda name: name != main):
-        drawn = [*_of_measured(described[name]), *(_of_others(posterior, tests) if name == main else [])]
-        views += [
-            {"formulation": name, "test": number, **_columns(bands, tests[number], unit)}
-            for number, bands in enumerate(drawn)
-            if bands is not None
-        ]
+    views = [
+        {"formulation": name, "test": number, **_columns(bands, test, unit)}
+        for name, tests in drawn.items()
+        for number, (test, bands) in enumerate(tests)
+        if bands is not None
+    ]
     return {
         "unit": unit.name,
-        "tests": [_test(test, sliders.basis(test), unit) for test in tests],
+        "tests": [_test(test, sliders.basis(test), unit) for test, _ in drawn[main]],
         "views": views,
         "parameters": sliders.linear + ([sliders.exponent] if sliders.exponent else []),
         "nodes": _rounded(sliders.nodes) if sliders.exponent else [],
@@ -118,20 +117,29 @@ def chart_data(
     }
 
 
-def _measured(described: Sequence[Described]) -> Iterator[_Test]:
-    """Yield the measured curves, of those with several paths each path."""
+def _measured(described: Sequence[Described]) -> Iterator[tuple[_Test, _Bands | None]]:
+    """Yield the measured curves with their bands, of those with several paths each path.
+
+    Bands that are no curve are drawn where the measurements are that are drawn.
+    """
     for described_curve in described:
         curve = described_curve.curve
         name = curve.name if len(described) > 1 else curve.mode.name
         name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
         pairs = zip(described_curve.ways, map(_spread, described_curve.measured_rows), strict=True)
         for number, ((indices, is_curve), rows) in enumerate(pairs, 1):
-            points, way = described_curve.points[_drawn(indices, is_curve)], ""
+            shown = indices if is_curve else _spread(indices)
+            points, way = described_curve.points[shown], ""
             if len(described_curve.ways) > 1 or rows_where_held(curve.mode, curve.points):
                 way = f", {held_along(curve.mode, points) or f'path {number}'}"
             abscissa, stress, is_back = curve.drawn_at()[rows], curve.stress[rows], curve.is_back[rows]
-            yield _Test(f"{name}{way}", curve.mode, curve.channel, points, abscissa, stress, curve.drawn_against,
-                        is_curve, is_back)  # fmt: skip
+            test = _Test(f"{name}{way}", curve.mode, curve.channel, points, abscissa, stress, curve.drawn_against,
+                         is_curve, is_back)  # fmt: skip
+            material_stress = _at(described_curve.stress_alone, shown) if described_curve.has_discrepancy else None
+            yield (
+                test,
+                _Bands(_at(described_curve.measurements, shown), _at(described_curve.stress, shown), material_stress),
+            )
 
 
 def _spread(indices: IndexArray) -> IndexArray:
@@ -140,44 +148,27 @@ def _spread(indices: IndexArray) -> IndexArray:
     return np.asarray(indices[np.unique(np.linspace(0, len(indices) - 1, count).astype(int))])
 
 
-def _drawn(indices: IndexArray, is_curve: bool) -> IndexArray:
-    """Return the places at which bands are drawn: where they are no curve, those of the measurements that are."""
-    return indices if is_curve else _spread(indices)
-
-
-def _others(posterior: Posterior) -> Iterator[_Test]:
-    """Yield the loading modes of one stretch that were not measured, over the strains that were."""
+def _others(posterior: Posterior) -> Iterator[tuple[_Test, _Bands | None]]:
+    """Yield the loading modes of one stretch that were not measured, over the strains that were, with their bands."""
     measured, none = {mode.name for mode in posterior.model.experiment.modes}, np.zeros(0)
     for name, stable_range in posterior.stable_ranges.items():
         if name not in measured:
             spaced = np.geomspace if stable_range.low > 0 else np.linspace  # curves bend where stretches are small
             points = spaced(stable_range.low, stable_range.high, GRID_POINTS)
-            yield _Test(f"{name} (predicted)", loading_mode(name), 0, points, none, none)
+            test = _Test(f"{name} (predicted)", loading_mode(name), 0, points, none, none)
+            yield test, _predicted(posterior, test)
 
 
-def _of_measured(described: Sequence[Described]) -> Iterator[_Bands | None]:
-    for described_curve in described:
-        for indices, is_curve in described_curve.ways:
-            drawn = _drawn(indices, is_curve)
-            material_stress = _at(described_curve.stress_alone, drawn) if described_curve.has_discrepancy else None
-            yield _Bands(_at(described_curve.measurements, drawn), _at(described_curve.stress, drawn), material_stress)
-
-
-def _of_others(posterior: Posterior, tests: Sequence[_Test]) -> Iterator[_Bands | None]:
-    """Yield the bands of all tests that were not measured; none where a posterior says nothing about a mode."""
-    weighted = [(1.0, posterior.solution)]
-    for test in tests:
-        if len(test.measured):
-            continue
-        try:
-            measurements, stress = predict_bands(weighted, test.points, (True, False), mode=test.mode)
-            material_stress = None
-            if posterior.model.discrepancy.parameters:
-                (material_stress,) = predict_bands(weighted, test.points, (False,), discrepancy=False, mode=test.mode)
-        except TissuqError:
-            yield None
-        else:
-            yield _Bands(measurements, stress, material_stress)
+def _predicted(posterior: Posterior, test: _Test) -> _Bands | None:
+    """Return the bands of a test that was not measured; none where a posterior says nothing about its mode."""
+    weighted, material_stress = [(1.0, posterior.solution)], None
+    try:
+        measurements, stress = predict_bands(weighted, test.points, (True, False), mode=test.mode)
+        if posterior.model.discrepancy.parameters:
+            (material_stress,) = predict_bands(weighted, test.points, (False,), discrepancy=False, mode=test.mode)
+    except TissuqError:
+        return None
+    return _Bands(measurements, stress, material_stress)
 
 
 def _at(band: Band, indices: IndexArray) -> Band:

@@ -17,7 +17,7 @@ from tissuq.next_test.candidates import Target
 from tissuq.next_test.ranking import TIED
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import said_by
-from tissuq.report.tables import Row, significant
+from tissuq.report.tables import significant
 from tissuq.studies.design import DesignSettings, DesignStudy
 
 if TYPE_CHECKING:
@@ -79,8 +79,8 @@ def design_table(study: DesignStudy, target: Target, limit: int | None = None) -
 
     With a limit it has so many of the best, and its note says where the others are.
     """
-    (factor, unit), every = _unit(study, target), _rows_of(study, target)
-    rows = every[:limit]
+    every = _rows_of(study, target)
+    rows, unit = every[:limit], every["unit"].iloc[0]
 
     def reduction(row: Any) -> str:
         error = f" ± {100 * row['error']:.1f} %" if row["error"] else ""
@@ -89,12 +89,12 @@ def design_table(study: DesignStudy, target: Target, limit: int | None = None) -
     columns: dict[str, Callable[[Any], str]] = {
         "test": lambda row: str(row["candidate"]),
         f"expected sd{', ' * bool(unit)}{unit}": lambda row: (
-            "" if isnan(row["reduction"]) else f"{row['sd_after'] / factor:#.3g}"
+            "" if isnan(row["reduction"]) else f"{row['sd_after']:#.3g}"
         ),
         "reduction": reduction,
         "note": lambda row: str(row["note"]),
     }
-    sd_now = significant(float(rows["sd_now"].iloc[0]) / factor)
+    sd_now = significant(float(rows["sd_now"].iloc[0]))
     whose = ", of the tissue" * (study.specimen == "other")
     title = f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
     more = len(every) - len(rows)
@@ -135,7 +135,8 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
         Where it lies.
     """
     said = said_by(run)
-    rows, model = _rows_in_unit(study), study.posterior.model
+    rows = [row for target in study.targets for row in _rows_of(study, target).to_dict("records")]
+    model = study.posterior.model
     figure = Picture("design", lambda: design_figure(study), "Expected standard deviations after each test", CAPTION)
     how_to_read = (
         *study.explanations,
@@ -165,25 +166,11 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
     )  # fmt: skip
 
 
-def _rows_in_unit(study: DesignStudy) -> list[Row]:
-    """Return the rows of the table, standard deviations in the unit of the data."""
-    units = {target.name: _unit(study, target) for target in study.targets}
-    rows: list[Row] = []
-    for record in study.table.to_dict("records"):
-        factor, unit = units[record["target"]]
-        in_unit: Row = {"unit": unit} | {name: record[name] / factor for name in SDS}
-        rows.append({str(name): value for name, value in record.items()} | in_unit)
-    return rows
-
-
 def _rows_of(study: DesignStudy, target: Target) -> pd.DataFrame:
-    return study.table[study.table["target"] == target.name]
-
-
-def _unit(study: DesignStudy, target: Target) -> tuple[float, str]:
-    """Return what one unit of a target's values is in MPa, and the unit's name."""
-    has_unit = bool(target.unit(study.posterior.model))
-    return (study.unit.to_mpa, study.unit.name) if has_unit else (1.0, "")
+    """Return the rows of a target, standard deviations in the unit of the data, which stands among them."""
+    rows, has_unit = study.table[study.table["target"] == target.name], target.unit(study.posterior.model)
+    to_mpa, name = (study.unit.to_mpa, study.unit.name) if has_unit else (1.0, "")
+    return rows.assign(unit=name, **{column: rows[column] / to_mpa for column in SDS})
 
 
 def _ranked(study: DesignStudy, target: Target) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -198,8 +185,7 @@ def _best(study: DesignStudy, target: Target) -> Number | None:
     if not len(best):
         return None
     row = best.iloc[0]
-    factor, unit = _unit(study, target)
-    after = f"{significant(row['sd_after'] / factor)}{' ' * bool(unit)}{unit}"
+    after = f"{significant(row['sd_after'])} {row['unit']}".strip()
     remark = f"lowers its sd by {100 * row['reduction']:.0f} %, to {after}{_tied(best)}"
     if len(again):
         remark += f"; repeating the data, by {100 * again.iloc[-1]['reduction']:.0f} %"
@@ -250,10 +236,9 @@ def _lines(name: str, letters: int) -> list[str]:
 
 def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame, letters: int) -> None:
     """Draw the tests of one target, their names in lines of so many letters."""
-    factor, unit = _unit(study, target)
-    sd_now, heights = float(table["sd_now"].iloc[0]) / factor, np.arange(len(table))[::-1]
+    sd_now, unit, heights = float(table["sd_now"].iloc[0]), table["unit"].iloc[0], np.arange(len(table))[::-1]
     for height, (_, row) in zip(heights, table.iterrows(), strict=True):
-        sd_after, error = row["sd_after"] / factor, 2 * row["error"] * sd_now
+        sd_after, error = row["sd_after"], 2 * row["error"] * sd_now
         color = BASE if row["is_repeat"] else BEYOND if row["beyond"] > 0 else BAND
         axis.plot([sd_after, sd_now], [height, height], color=color, lw=2, alpha=0.4, solid_capstyle="butt")
         axis.plot([sd_after - error, sd_after + error], [height, height], color=INK, lw=1.2)

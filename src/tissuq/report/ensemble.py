@@ -22,7 +22,7 @@ from tissuq.decks.solver import CalculiXSolver
 from tissuq.experiments.units import stress_unit
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.report.band_table import OF_RANGES, Bands, percent_of
-from tissuq.report.ensemble_figures import band_over_time, quantity_figure, state_figure, write_fields
+from tissuq.report.finite_element_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Picture, Preformatted, Result, Section, Table
 from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import known_number

@@ -81,16 +81,12 @@ def predictive_figure(
             posterior, curve, of_panel = posteriors[name], of_curve.curve, bands[index]
             inside = posterior.inside_bands(discrepancy=discrepancy)[index % len(curves)].sum()
             axis.set_title(f"{_label(posteriors, name, curve, drawn.letters)}{inside} of {len(curve)} inside")
-            for indices, is_curve in of_curve.ways:
-                low, high, median = (
-                    band_values[indices] / unit.to_mpa for band_values in (of_panel.low, of_panel.high, of_panel.median)
-                )
-                band(axis, of_curve.abscissa[indices], low, high, is_path=is_curve, label="95 % predictive band")
-                line(axis, of_curve.abscissa[indices], median, is_path=is_curve, label="predicted median")
-                if name != "none" and base:
-                    none = base[index % len(curves)]
-                    line(axis, of_curve.abscissa[indices], none.median[indices] / unit.to_mpa, color=BASE, style=":",
-                         width=1.4, is_path=is_curve, label="median of the fit 'none'")  # fmt: skip
+            low, high, median = (values / unit.to_mpa for values in (of_panel.low, of_panel.high, of_panel.median))
+            band(axis, of_curve.abscissa, low, high, ways=of_curve.ways, label="95 % predictive band")
+            line(axis, of_curve.abscissa, median, ways=of_curve.ways, label="predicted median")
+            if name != "none" and base:
+                line(axis, of_curve.abscissa, base[index % len(curves)].median / unit.to_mpa, color=BASE, style=":",
+                     width=1.4, ways=of_curve.ways, label="median of the fit 'none'")  # fmt: skip
             if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
                 ends = float(of_panel.stretch[0]), float(of_panel.stretch[-1])
                 shade_instability(axis, posterior.stable_ranges.get(curve.mode.name), *ends)

@@ -13,7 +13,9 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
 from tissuq.experiments.units import stress_unit
-from tissuq.report.run_folder import write_data, write_figures
+from tissuq.report.run_folder import write_figures
+from tissuq.report.tables import write_csv
+from tissuq.report.writer import data_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +43,8 @@ REGIONS: dict[str, dict[str, Any]] = {
 def write_inspection(inspections: Sequence[Inspection], folder: Path) -> None:
     """Write figures, converted data and text of every test into an empty folder."""
     experiment = Experiment.of([inspection.reading.experiment for inspection in inspections])
-    write_data(folder, experiment, stress_unit(experiment.stress_unit))
+    for name, rows in data_file(experiment, stress_unit(experiment.stress_unit)).items():
+        write_csv(folder / name, rows)
     numbers = [f"-{number}" for number in range(1, len(inspections) + 1)] if len(inspections) > 1 else [""]
     figures = {f"curve{number}": curve_figure(item) for number, item in zip(numbers, inspections, strict=True)}
     write_figures(folder, figures)

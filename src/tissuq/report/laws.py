@@ -210,12 +210,11 @@ def curve_figure(study: LawStudy) -> Figure:
         for axis, curve in zip(axes, curves, strict=True):
             pieces.points(axis, curve.drawn_at(), curve.stress / scale, color=BASE, is_back=curve.is_back)
             points = points_along(curve, LINE_POINTS)
-            states = curve.path.at(points)
+            states, abscissa = curve.path.at(points), curve.drawn_at(points)
+            ways = ways_of(curve.mode, points, abscissa)
             for number, name in enumerate(names):
                 stress = study.comparison.alone[name].stress(states)
-                for indices, is_curve in ways_of(curve.mode, points, curve.drawn_at(points)):
-                    pieces.line(axis, curve.drawn_at(points)[indices], stress[indices] / scale, color=SERIES[number],
-                                width=1.2, is_path=is_curve, label=name)  # fmt: skip
+                pieces.line(axis, abscissa, stress / scale, color=SERIES[number], width=1.2, ways=ways, label=name)
             axis.set_title(curve.name)
             axis.set_xlabel(curve.drawn_name)
             axis.set_ylabel(f"engineering stress [{study.unit.name}]")

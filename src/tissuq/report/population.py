@@ -31,16 +31,16 @@ from tissuq.report.population_figures import (
     patient_figure,
     specimens_figure,
 )
-from tissuq.report.population_in_words import next_step_of
-from tissuq.report.population_tables import (
+from tissuq.report.population_in_words import (
     effects_of_covariates,
     needed_of,
     needed_table_of,
+    next_step_of,
     patient_in_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
-from tissuq.report.tables import Row, interval, significant, with_named_units
+from tissuq.report.tables import Row, interval, rows_of, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
 from tissuq.studies.settings import DATA
@@ -111,8 +111,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     share = share_of_discrepancy(population, study.warnings, study.at_rest)
     several = len(study.modes) > 1
     files: dict[str, Any] = {DATA: with_named_units(_data_rows(study, several), ["stress"], unit)}
-    summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
-    tables = {name: _in_units(study, table) for name, table in summaries.items()}
+    summaries = {"population": population.summary, "specimens": population.specimen_summary}
+    tables = {name: _with_units(study, summary(unit=unit.name)) for name, summary in summaries.items()}
     tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
     tables |= {"specimens_needed": needed} if (needed := needed_of(study)) is not None else {}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
@@ -123,7 +123,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
     count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
     modes = ", ".join(mode.name for mode in study.modes)
-    words, predicted = headline(population)[0], [_band(of_mode) for of_mode, _ in bands.values()]
+    columns = ("stretch", "median", "low", "high")
+    predicted = [Band(*(of_mode[name].to_numpy(float) for name in columns)) for of_mode, _ in bands.values()]
+    words = headline(population)[0]
     quantity = "modulus" if words == MODULUS else words
     uses = uses_of_population(population, predicted, study.warnings, quantity, study.at_rest)
     uses = (*uses, use_of_law_alone(share, uses[-1]))
@@ -174,23 +176,23 @@ def _share(half_width: float) -> str:
 
 def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
     """Return what to expect of a new specimen, and median and spread of the population: of its headline."""
-    population = study.population
-    symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
-    factor, unit = _scale(study, symbol)
-    table = numbers_of(population.summary(unit="MPa"))
-    words, times = headline(population)
-
-    def number(name: str, quantity: str, divisor: float, unit: str) -> Number:
-        median, low, high = (table[symbol, quantity][end] / divisor for end in ("median", *ENDS))
-        return Number(name, median, low, high, unit)
-
-    spread = "spread between specimens" + (", as a factor" if is_log else "")
-    middle, low, high = (exp(table[symbol, "spread"][end]) for end in ("median", *ENDS))
+    words, is_log = headline(study.population)[0], bool(study.population.coordinates.is_log[0])
     return (
-        number(f"{words} of a new specimen{patient_in_words(study)}", "new patient", factor / times, unit),
-        number(f"{words}, median of the population", "median", factor / times, unit),
-        Number(spread, middle, low, high) if is_log else number(spread, "spread", factor / times, unit),
+        _of_headline(study, "new patient", f"{words} of a new specimen{patient_in_words(study)}"),
+        _of_headline(study, "median", f"{words}, median of the population"),
+        _of_headline(study, "spread", f"spread between specimens{', as a factor' * is_log}"),
     )
+
+
+def _of_headline(study: PopulationStudy, quantity: str, name: str = "") -> Number:
+    """Return a quantity of the headline, in the unit of the files; a spread of logarithms as a factor."""
+    population = study.population
+    symbol, (_, times) = population.symbols[0], headline(population)
+    numbers = numbers_of(population.summary(unit=study.unit.name))[symbol, quantity]
+    middle, low, high = (numbers[end] for end in ("median", *ENDS))
+    if quantity == "spread" and population.coordinates.is_log[0]:
+        return Number(name, exp(middle), exp(low), exp(high))
+    return Number(name, times * middle, times * low, times * high, _unit(study, symbol))
 
 
 def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predicted: list[str]) -> tuple[Section, ...]:
@@ -256,8 +258,7 @@ def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
         for curve in (curve for test in tests for curve in test.curves):
             labels: Row = {"specimen": name} | ({"mode": curve.mode.name} if several else {})
             labels |= {"measured": curve.quantity} if has_stresses else {}
-            pairs = zip(curve.abscissa.tolist(), curve.stress.tolist(), strict=True)
-            rows += [labels | {"stretch": stretch, "stress": stress} for stretch, stress in pairs]
+            rows += rows_of({"stretch": curve.abscissa, "stress": curve.stress}, labels)
     return rows
 
 
@@ -280,11 +281,6 @@ def _bands(study: PopulationStudy) -> tuple[dict[Measured, Bands], list[str]]:
         except TissuqError as error:  # two controls, or some of the population's materials lock before the largest
             not_predicted.append(f"{mode.name}: {error}")
     return bands, not_predicted
-
-
-def _band(table: pd.DataFrame) -> Band:
-    """Return the stress of a new specimen as a band, MPa."""
-    return Band(*(table[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
 
 
 def _band_table(bands: Mapping[Measured, Bands], several: bool) -> pd.DataFrame:
@@ -317,54 +313,50 @@ def _copies(study: PopulationStudy, beside: Path) -> tuple[Copies, dict[str, Any
     return copies, relocated
 
 
-def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table indexed by parameter, and perhaps quantity, in the unit of the files, with a column ``unit``."""
+def _with_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table indexed by parameter, and perhaps quantity, with a column ``unit``."""
     is_log = dict(zip(study.population.symbols, study.population.coordinates.is_log, strict=True))
-    scales = [
-        (1.0, "") if row.get("quantity") == "spread" and is_log[row["parameter"]] else _scale(study, row["parameter"])
+    units = [
+        "" if row.get("quantity") == "spread" and is_log[row["parameter"]] else _unit(study, row["parameter"])
         for row in table.index.to_frame().to_dict("records")
     ]
-    scaled = table.div([factor for factor, _ in scales], axis=0)
-    scaled.insert(0, "unit", [name for _, name in scales])
-    return scaled
+    table.insert(0, "unit", units)
+    return table
 
 
 def _parameters(study: PopulationStudy) -> Table:
     """Return the parameters of the population in the unit of the files."""
     population, rows = study.population, []
-    table = numbers_of(population.summary(unit="MPa"))
+    table = numbers_of(population.summary(unit=study.unit.name))
     for symbol, is_log in zip(population.symbols, population.coordinates.is_log, strict=True):
-        factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
             numbers = table[symbol, quantity]
             if quantity == "spread" and is_log:
                 cells = ["factor", words, *_text({name: exp(number) for name, number in numbers.items()})]
             else:
-                cells = [unit, words, *_text(numbers, factor)]
+                cells = [_unit(study, symbol), words, *_text(numbers)]
             rows.append([symbol, *cells])
     headers = ["parameter", "unit", "quantity", "median", "95 % interval"]
     return Table(headers, rows, f"A population of {len(study.tests)} specimens", (1, 2), _note(population))
 
 
 def _readable_specimens(study: PopulationStudy) -> list[list[str]]:
-    rows, table = [], numbers_of(study.population.specimen_summary(unit="MPa"))
+    rows, table = [], numbers_of(study.population.specimen_summary(unit=study.unit.name))
     for name in study.population.names:
         for symbol in study.population.symbols:
-            factor, unit = _scale(study, symbol)
             numbers = table[name, symbol]
-            rows.append([name, symbol, unit, *_text(numbers, factor, "alone_"), *_text(numbers, factor)])
+            rows.append([name, symbol, _unit(study, symbol), *_text(numbers, "alone_"), *_text(numbers)])
     return rows
 
 
-def _scale(study: PopulationStudy, symbol: str) -> tuple[float, str]:
-    """Return what one unit of a parameter is in MPa, and the unit's name."""
-    unit = study.population.unit_of(symbol, study.unit)
-    return unit.to_mpa, unit.name
+def _unit(study: PopulationStudy, symbol: str) -> str:
+    """Return the name of the unit of a parameter."""
+    return study.population.unit_of(symbol, study.unit).name
 
 
-def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -> tuple[str, str]:
+def _text(numbers: Mapping[str, float], prefix: str = "") -> tuple[str, str]:
     """Return a median and an interval with the decimals that its width supports."""
-    low, middle, high = (numbers[f"{prefix}{name}"] / factor for name in ("hdi_low", "median", "hdi_high"))
+    low, middle, high = (numbers[f"{prefix}{name}"] for name in ("hdi_low", "median", "hdi_high"))
     width = (high - low) / 4
     largest = max(low, middle, high, key=abs)
     return interval(middle, largest, width)[0], "[{}, {}]".format(*interval(low, high, width))
@@ -372,21 +364,15 @@ def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -
 
 def _lead(study: PopulationStudy) -> str:
     """Return the finding in two sentences."""
-    symbol, (words, times) = study.population.symbols[0], headline(study.population)
-    factor, unit = _scale(study, symbol)
-    factor, quantity = factor / times, symbol if words == symbol else f"the {words}"
-    table = numbers_of(study.population.summary(unit="MPa"))
-    middle, _ = _text(table[symbol, "median"], factor)
-    new, complete = (
-        _text(table[symbol, name], factor)[1].strip("[]").replace(",", " to")
-        for name in ("new patient", "complete pooling")
-    )
+    symbol, words = study.population.symbols[0], headline(study.population)[0]
+    quantity = symbol if words == symbol else f"the {words}"
+    median, new, complete = (_of_headline(study, name) for name in ("median", "new patient", "complete pooling"))
     far = " ".join(
         f"{name} is {ratio:.2g} times as stiff as the others, which makes these intervals as wide as they are."
         for name, ratio in far_specimens(study.population).items()
     )
     return (
-        f"The median of {quantity} in the population is {middle} {unit}; for a specimen that has not been measured"
-        f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
-        f"say {complete} {unit}, which is no range of specimens.{f' {far}' * bool(far)}"
+        f"The median of {quantity} in the population is {median.text}; for a specimen that has not been measured"
+        f"{patient_in_words(study)} it is {new.range} {new.unit} (95 %). Taking all measurements for those of one "
+        f"specimen would say {complete.range} {new.unit}, which is no range of specimens.{f' {far}' * bool(far)}"
     )

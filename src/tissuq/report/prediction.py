@@ -1,10 +1,13 @@
-"""The result of a prediction: the stress at the end of the range, bands and scores as tables and labelled arrays."""
+"""The result of a prediction: the stress at the end of the range, and tables of bands and of how measurements do."""
 
 from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Callable
 from dataclasses import replace
+from math import isnan
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,32 +18,24 @@ from tissuq.assessment.uses import COMPUTING, UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.errors import InputError
+from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
 from tissuq.report.measured import named
-from tissuq.report.prediction_tables import (
-    band_table,
-    end_words,
-    kind_words,
-    median_words,
-    score_table,
-    scored_kind,
-    share_words,
-)
-from tissuq.report.result import Number, Picture, Result, Section
+from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import uses_of
 from tissuq.report.summary import SAME_STATES
-from tissuq.report.tables import table_files
+from tissuq.report.tables import interval, significant, table_files
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
 from tissuq.studies.settings import seen_from
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
     from tissuq.studies.run_settings import PredictionSettings
 
-__all__ = ["prediction_figure", "prediction_result"]
-
+__all__ = ["band_table", "prediction_figure", "prediction_result", "score_table"]
 
 SCORES = ("crps", "interval_score")
 """Columns that are stresses."""
@@ -151,11 +146,10 @@ def _shares(prediction: Prediction) -> list[Number]:
     """Return how many measurements lie inside the band, and how much of the range is extrapolated."""
     numbers, count = [], len(prediction.points)
     if prediction.scores is not None:
-        kind = "with" if prediction.kinds[0] else "without"
-        rows = prediction.scores[(prediction.scores["discrepancy"] == kind) & (prediction.scores["range"] == "all")]
+        rows = prediction.scores_of(prediction.kinds[0])
         inside, all_of_them = round(float((rows["inside"] * rows["count"]).sum())), int(rows["count"].sum())
         value = f"{inside} of {all_of_them}"
-        width = f"half width of the band {share_words(float(rows['half_width'].max()))}"
+        width = f"half width of the band {_share_words(float(rows['half_width'].max()))}"
         remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
         numbers.append(Number("measurements inside the band", value, remark=remark))
     extrapolated = count - int(prediction.is_calibrated.sum())
@@ -249,7 +243,8 @@ def _lead_of_scores(prediction: Prediction) -> str:
         stress_words = f" ({name})" if len(prediction.stresses) > 1 else ""
         findings = [
             f"{100 * row['inside']:.0f} % lie in the {100 * prediction.prob:.4g} % band "
-            f"({scored_kind(prediction, row)}), whose median errs by {share_words(row['error'])} of the stress"
+            f"({_kind_words(prediction, row['discrepancy'] == 'with')}), whose median errs by "
+            f"{_share_words(row['error'])} of the stress"
             for row in rows.to_dict("records")
         ]
         count = rows["count"].iloc[0]
@@ -264,14 +259,18 @@ def _lead_of_bands(prediction: Prediction) -> str:
 
     The numbers are of the end of what is calibrated, with the discrepancy where the run has one.
     """
-    index, change, kind = _calibrated_end(prediction), _changes(prediction), kind_words(prediction, prediction.kinds[0])
+    index, change, kind = (
+        _calibrated_end(prediction),
+        _changes(prediction),
+        _kind_words(prediction, prediction.kinds[0]),
+    )
     farthest = int(change.argmax())
     if change[index] < change[farthest]:
         stresses = _stresses_at(prediction, farthest, prediction.kinds[0])
         return f"Extrapolated to {_point(prediction, farthest)}, {kind}, {stresses}."
     if not prediction.kinds[0]:
         return f"Predicted by {kind}."
-    material_words = kind_words(prediction, kind=False)
+    material_words = _kind_words(prediction, kind=False)
     return f"Predicted {kind}. There, for {material_words}, {_stresses_at(prediction, index, kind=False)}."
 
 
@@ -286,7 +285,7 @@ def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
     )
     for channel, name in enumerate(prediction.stresses):
         band, scale = prediction.curves[channel, kind, False], prediction.unit.to_mpa
-        median, ends = (words(band, index, scale) for words in (median_words, end_words))
+        median, ends = _median_words(band, index, scale), _end_words(band, index, scale)
         half_width = (band.high[index] - band.low[index]) / 2
         is_known = half_width <= UNKNOWN * largest
         unit, percent = prediction.unit.name, f"{100 * prediction.prob:.4g} %"
@@ -313,3 +312,86 @@ def _changes(prediction: Prediction) -> FloatArray:
 def _point(prediction: Prediction, index: int) -> str:
     controls = zip(prediction.mode.controls, prediction.controls.values(), strict=True)
     return " and ".join(f"{control.name} {column[index]:.4g}" for control, column in controls)
+
+
+MAX_ROWS = 13
+"""Number of rows of the table of bands on page and terminal; the files have all."""
+MAX_SHARE, MAX_STRESS, MIN_STRESS = 10.0, 1e5, 1e-12
+"""Largest share shown as a percentage; stresses (in the unit of the run) shown in powers of ten, and as zero."""
+
+
+def band_table(prediction: Prediction) -> Table:
+    """Return some rows of the bands, from end to end, as text in the unit of the run."""
+    rows, unit, several = [], prediction.unit, len(prediction.stresses) > 1
+    names, count = [control.name for control in prediction.mode.controls], len(prediction.points)
+    share = f"{100 * prediction.prob:.4g} %"
+    bands = ["median", f"{share} of the stress", f"{share} of measurements"]
+    bands_alone = ["alone: median", "alone: stress", "alone: measurements"] if prediction.kinds[0] else []
+    indices = np.unique(np.linspace(0, count - 1, min(count, MAX_ROWS)).round().astype(int))
+    for channel, name in enumerate(prediction.stresses):
+        for index in indices:
+            cells = [f"{column[index]:.4g}" for column in prediction.controls.values()] + [name] * several
+            for kind in prediction.kinds:
+                stress, noisy = (prediction.curves[channel, kind, noise] for noise in (False, True))
+                ends = [_end_words(band, index, unit.to_mpa) for band in (stress, noisy)]
+                cells += [_median_words(stress, index, unit.to_mpa), *ends]
+            rows.append([*cells, "yes" if prediction.is_calibrated[index] else "no"])
+    alone_words = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
+    excerpt = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
+    note = f"{unit.name}, {', '.join(prediction.stresses)}. {alone_words}{excerpt}".strip()
+    headers = [*names, *["measured"] * several, *bands, *bands_alone, "calibrated"]
+    title = f"Stress in mode {prediction.mode.name}, {unit.name}"
+    return Table(headers, rows, title, (len(names),) if several else (), note)
+
+
+def score_table(prediction: Prediction, scores: pd.DataFrame, data: str) -> Table:
+    """Return as text how the measurements of that name are predicted."""
+    several, unit = len(prediction.stresses) > 1, prediction.unit.name
+    columns: dict[str, Callable[[Any], str]] = {
+        "prediction": lambda row: _kind_words(prediction, row["discrepancy"] == "with"),
+        **({"measured": itemgetter("measured")} if several else {}),
+        "range": itemgetter("range"),
+        "points": lambda row: f"{row['count']}",
+        f"inside {100 * prediction.prob:.4g} %": lambda row: _share_words(row["inside"]),
+        "half width": lambda row: _share_words(row["half_width"]),
+        "error": lambda row: _share_words(row["error"]),
+        f"CRPS, {unit}": lambda row: _stress(row["crps"]),
+        f"interval score, {unit}": lambda row: _stress(row["interval_score"]),
+    }
+    text_columns = (1, 2) if several else (1,)
+    return Table.of(scores.to_dict("records"), columns, f"Measurements of {data}", text_columns=text_columns)
+
+
+def _kind_words(prediction: Prediction, kind: bool) -> str:
+    """Return what is predicted: ``with the discrepancy gp``, or ``neo-hookean alone``."""
+    model = prediction.posterior.model
+    return f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
+
+
+def _share_words(value: float) -> str:
+    """Return a share of the stress as a percentage."""
+    return "" if isnan(value) else f"{100 * value:.0f} %" if value < MAX_SHARE else f"> {100 * MAX_SHARE:.0f} %"
+
+
+def _stress(value: float, digits: int = 3) -> str:
+    return significant(value, digits) if abs(value) < MAX_STRESS else f"{value:.0e}"
+
+
+def _median_words(band: Band, index: int, scale: float) -> str:
+    """Return the median of a band with digits that its width supports; `scale` is the unit of stress in MPa."""
+    median, width = (float(stress[index]) / scale for stress in (band.median, band.high - band.low))
+    if max(abs(median), width) < MIN_STRESS:
+        return "0"
+    if abs(median) >= MAX_STRESS:
+        return f"{median:.0e}"
+    return interval(median, median, min(width / 4, abs(median) or width))[0]
+
+
+def _end_words(band: Band, index: int, scale: float) -> str:
+    """Return both ends of a band: ``4 to 6``."""
+    low, high = (float(stress[index]) / scale for stress in (band.low, band.high))
+    if max(-low, high) < MIN_STRESS:
+        return "0"
+    is_plain = max(-low, high) < MAX_STRESS
+    texts = interval(low, high, (high - low) / 4) if is_plain else (_stress(low, 1), _stress(high, 1))
+    return "{} to {}".format(*texts)

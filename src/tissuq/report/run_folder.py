@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import platform
 import re
@@ -13,23 +12,19 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
-from itertools import repeat
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import unbroken
-from tissuq.studies.settings import DATA, INPUT, RECIPE
+from tissuq.studies.settings import INPUT, RECIPE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
     from pydantic import BaseModel
-
-    from tissuq.experiments.experiment import Experiment
-    from tissuq.experiments.units import StressUnit
 
 __all__ = [
     "ASSESSMENT",
@@ -40,7 +35,6 @@ __all__ = [
     "check_target",
     "run_folder",
     "versions",
-    "write_data",
     "write_figures",
     "write_page",
     "write_recipe",
@@ -242,28 +236,6 @@ def _asset(name: str) -> str:
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries on which numbers depend."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
-
-
-def write_data(folder: Path, experiment: Experiment, unit: StressUnit | None = None) -> None:
-    """Write the measurements as fitted, in full precision: stretch and engineering stress, in MPa unless said.
-
-    Of several tests with the name of each and its mode, and with direction and condition where these are said.
-    """
-    stress, to_mpa = ("stress", 1.0) if unit is None else (f"stress [{unit.name}]", unit.to_mpa)
-    headers = ["test", "mode", "measured"] if len(experiment.curves) > 1 else []
-    stated = [name for name in ("direction", "condition") if any(getattr(curve, name) for curve in experiment.curves)]
-    with (folder / DATA).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        has_errors = bool(experiment.standard_error.any())
-        writer.writerow(
-            [*headers, *stated, "stretch", stress, *[stress.replace("stress", "standard_error")] * has_errors]
-        )
-        for curve in experiment.curves:
-            labels = (curve.name, curve.mode.name, curve.quantity)[: len(headers)]
-            label_columns = map(repeat, (*labels, *(getattr(curve, name) for name in stated)))
-            stresses = [curve.stress, *[curve.standard_error] * has_errors]
-            values = curve.abscissa.tolist(), *((column / to_mpa).tolist() for column in stresses)
-            writer.writerows(zip(*label_columns, *values, strict=False))
 
 
 def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:

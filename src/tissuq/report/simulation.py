@@ -16,8 +16,7 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY,
 from tissuq.finite_elements.solver import CellFields
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.band_table import OF_RANGES, SHARES, Bands, handy_unit, percent_of
-from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.simulation_figures import (
+from tissuq.report.finite_element_figures import (
     field_figure,
     force_and_strain_figure,
     force_figure,
@@ -26,6 +25,7 @@ from tissuq.report.simulation_figures import (
     write_collection,
     write_vtu,
 )
+from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import Said, said_by
 from tissuq.report.tables import known_number, significant
 from tissuq.studies.structure import SimulationStudy

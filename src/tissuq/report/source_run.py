@@ -60,6 +60,11 @@ class Said:
         """What stands in cards of its draws; nothing where it says nothing."""
         return f"{self.use.purpose}: {self.use.verdict.upper()}, {self.use.reason}" if self.use else ""
 
+    def source_of_cards(self, run: Path, sampling: str, seed: int) -> str:
+        """Return what cards say of where they are from, and for what its draws are of use."""
+        drawn = f"run {run.resolve().name} of tissuq, {sampling} draws from seed {seed}"
+        return "; ".join(filter(None, [drawn, self.of_cards]))
+
     @property
     def advice(self) -> str:
         """What to do before it is used in finite elements; nothing where it serves them."""

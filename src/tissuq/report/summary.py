@@ -193,8 +193,6 @@ def stability_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
                 "mode": mode,
                 "stretch_low": stable_range.low,
                 "stretch_high": stable_range.high,
-            }
-            row |= {
                 "stable": stable_range.probability,
                 "surely_low": stable_range.surely_low,
                 "surely_high": stable_range.surely_high,

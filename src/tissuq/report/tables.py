@@ -9,11 +9,12 @@ from math import floor, inf, isfinite, log10
 from pathlib import Path
 from typing import Any
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.units import StressUnit
 
 __all__ = [
-    "Row", "in_unit_of", "interval", "known_number", "percent", "significant", "stretch_in_words", "table_files",
-    "with_named_units", "write_csv", "write_json",
+    "Row", "in_unit_of", "interval", "known_number", "percent", "rows_of", "significant", "stretch_in_words",
+    "table_files", "with_named_units", "write_csv", "write_json",
 ]  # fmt: skip
 
 Row = dict[str, Any]
@@ -47,6 +48,12 @@ def with_named_units(rows: Sequence[Row], columns: Sequence[str], unit: StressUn
 def table_files(name: str, rows: Sequence[Row], columns: Sequence[str], unit: StressUnit) -> dict[str, list[Row]]:
     """Return rows whose columns are in MPa as files in another unit: CSV with it in the heads, and JSON with it."""
     return {f"{name}.csv": with_named_units(rows, columns, unit), f"{name}.json": in_unit_of(rows, columns, unit)}
+
+
+def rows_of(columns: Mapping[str, FloatArray], labels: Row) -> list[Row]:
+    """Return columns of numbers as rows, each with labels before them."""
+    values = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [labels | dict(zip(columns, row, strict=True)) for row in values]
 
 
 def known_number(number: float) -> float | None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints, is_
 
 from tissuq.errors import InputError
 from tissuq.report.result import RESULT, Record, Result, few_and_others
-from tissuq.report.run_folder import RECIPE, write_data, write_figures, write_page, write_recipe
-from tissuq.report.tables import write_csv, write_json
+from tissuq.report.run_folder import RECIPE, write_figures, write_page, write_recipe
+from tissuq.report.tables import Row, rows_of, write_csv, write_json
 from tissuq.studies.settings import DATA, damage_reported
 
 if TYPE_CHECKING:
@@ -133,8 +133,21 @@ def _without_record(folder: Path) -> InputError:
 
 
 def data_file(experiment: Experiment, unit: StressUnit | None = None) -> dict[str, Any]:
-    """Return data.csv with the measurements of an experiment, as a file of a result."""
-    return {DATA: lambda path: write_data(path.parent, experiment, unit)}
+    """Return data.csv with the measurements as fitted, in full precision: stretch and engineering stress.
+
+    In MPa unless said. Of several tests with the name of each and its mode, and with direction and condition where
+    these are said.
+    """
+    end, to_mpa = ("", 1.0) if unit is None else (f" [{unit.name}]", unit.to_mpa)
+    stated = [name for name in ("direction", "condition") if any(getattr(curve, name) for curve in experiment.curves)]
+    several, has_errors = len(experiment.curves) > 1, experiment.standard_error.any()
+    rows: list[Row] = []
+    for curve in experiment.curves:
+        labels: Row = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity} if several else {}
+        columns = {"stretch": curve.abscissa, f"stress{end}": curve.stress / to_mpa}
+        columns |= {f"standard_error{end}": curve.standard_error / to_mpa} if has_errors else {}
+        rows += rows_of(columns, labels | {name: getattr(curve, name) for name in stated})
+    return {DATA: rows}
 
 
 def posterior_files(posteriors: Mapping[str, Posterior], suffix: str = "") -> dict[str, Callable[[Path], object]]:

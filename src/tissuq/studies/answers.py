@@ -17,11 +17,11 @@ from tissuq.studies.settings import imported
 
 __all__ = ["DIMENSIONS", "Answer", "answers_in", "options_in", "with_options"]
 
-SWITCHES = {"compression-positive": True, "tension-positive": False, "until-peak": True, "incompressible": True}
-"""Options without a value, and what they say."""
 READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
 """How every option of reading is taken, by its name; that which says no stands for the same setting."""
 READING |= {slot.option.negative: slot for slot in READING.values() if slot.option.negative}
+SWITCHES = {name: name != slot.option.negative for name, slot in READING.items() if slot.reads is bool}
+"""Options without a value, and what they say."""
 DIMENSIONS = tuple(name for name, slot in READING.items() if slot.path[0] == "dimensions")
 """Options that are sizes."""
 TYPED = (*DIMENSIONS, "axial-stretch")

@@ -32,7 +32,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.result_warning import ResultWarning
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
-from tissuq.studies.earlier_run import load_law, priors_of_run
+from tissuq.studies.earlier_run import load_law, priors_of
 from tissuq.studies.settings import DATA, INPUT, damage_reported
 from tissuq.studies.stream import Step, silent
 
@@ -171,7 +171,8 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
     """Return settings in which the posterior of a run stands as priors; what is stated of a parameter stays."""
     if settings.prior_run is None:
         return settings
-    priors, correlations = priors_of_run(folder / settings.prior_run, str(settings.material), settings.unit)
+    posterior = load_law(folder / settings.prior_run, str(settings.material))
+    priors, correlations = priors_of(posterior, settings.unit)
     stated = settings.priors
     pairs = {",".join(pair): value for pair, value in correlations.items() if not set(pair) & set(stated)}
     changes = {
@@ -186,7 +187,7 @@ def _check_other_measurements(settings: CalibrationSettings, data: Mapping[str, 
     """Refuse the posterior of measurements as the prior beside them, whatever their file is called and in any unit."""
     for name, measured in data.items():
         fitted = [
-            *_stresses_of(run, str(settings.material)),
+            *(curve.stress for curve in load_law(run, str(settings.material)).model.experiment.curves),
             *_stresses_of_specimens(run, len(measured.measured), settings.every),
             *_columns_of_inputs(settings, measured, run),
         ]
@@ -196,12 +197,6 @@ def _check_other_measurements(settings: CalibrationSettings, data: Mapping[str, 
                 f"({measured.measured_label}), which would count twice: give a run of other tests (--prior-run), or "
                 "the priors themselves, as --prior C10=uniform(0.1, 5)."
             )
-
-
-def _stresses_of(run: Path, material: str) -> Iterator[FloatArray]:
-    """Yield the stresses to which a run was fitted."""
-    for curve in load_law(run, material).model.experiment.curves:
-        yield curve.stress
 
 
 def _stresses_of_specimens(run: Path, count: int, stride: int) -> Iterator[FloatArray]:

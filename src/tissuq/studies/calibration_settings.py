@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from pydantic import field_validator, model_validator
 
-from tissuq.studies.model_settings import ModelSettings
+from tissuq.studies.finite_element_settings import ModelSettings
 from tissuq.studies.option import argument, only_rows, option, seed
 from tissuq.studies.option_texts import column, number_or_text, pairs_of, priors, sd_or_unknown
 from tissuq.studies.settings import positive_or_unknown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,13 +13,36 @@ from tissuq.studies.option import Settings, argument, option, seed
 from tissuq.studies.option_texts import priors, tolerances
 from tissuq.studies.settings import SizesOfErrors, imported
 
-__all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions"]
+__all__ = [
+    "CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions", "each_once",
+    "names_among",
+]  # fmt: skip
 
 NoiseKnown = Annotated[
     tuple[Literal["known", "unknown"], ...],
     BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
 ]
 NOISE = "known or unknown to the fits."
+
+
+def each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return the values of a setting, of which none is given twice."""
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            raise ValueError(f"{value} is given twice, which would count the same fits twice")
+    return values
+
+
+def names_among(available: Collection[str], what: str) -> Callable[[tuple[str, ...]], tuple[str, ...]]:
+    """Return a validator of names of something, which must be among those that there are."""
+
+    def check(names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name not in available:
+                raise ValueError(f"there is no {what} '{name}'; choose from {', '.join(available)}")
+        return names
+
+    return check
 
 
 class PaperOptions(Settings):
@@ -81,9 +105,10 @@ class TissueOptions(Settings):
         ("tests", "specimens", "ends"),
         "What is predicted: tests, modes, specimens, ends, halves; repeat for more [tests, specimens, ends].",
         name="protocol",
+        min_length=1,
     )
     formulations: tuple[str, ...] = option(
-        ("auto", "none"), "Discrepancy, or embedded; repeat for more [auto, none].", name="discrepancy"
+        ("auto", "none"), "Discrepancy, or embedded; repeat for more [auto, none].", name="discrepancy", min_length=1
     )
     material: str = option("neo-hookean", "The material that is fitted.")
     tolerances: SizesOfErrors = option(

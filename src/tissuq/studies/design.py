@@ -21,7 +21,7 @@ from tissuq.next_test.ranking import rank_tests
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.earlier_run import load
 from tissuq.studies.ensemble import drawn_materials
-from tissuq.studies.model_settings import EnsembleSettings
+from tissuq.studies.finite_element_settings import EnsembleSettings
 from tissuq.studies.run_settings import DesignSettings
 from tissuq.studies.settings import RECIPE, damage_reported, load_settings
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "POSTERIORS", "answering", "load", "load_law", "load_run", "load_without_discrepancy", "modes_of", "posteriors_in",
-    "priors_of", "priors_of_run", "recipe_of",
+    "priors_of", "recipe_of",
 ]  # fmt: skip
 
 POSTERIORS = "posterior"
@@ -134,7 +134,7 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
     InputError
         When the folder is no such run.
     """
-    from tissuq.studies.specimen_settings import LawSettings, SpecimenSettings
+    from tissuq.studies.fit_settings import LawSettings, SpecimenSettings
 
     run = Path(folder)
     recipe = run / RECIPE
@@ -199,17 +199,6 @@ def _compares_laws(run: Path) -> bool:
     with suppress(InputError):
         return setting_of(run / RECIPE, "laws") is not None
     return False
-
-
-def priors_of_run(run: Path, material: str, unit: str) -> tuple[dict[str, Prior], dict[tuple[str, str], float]]:
-    """Return `priors_of` the posterior of a run of a law.
-
-    Raises
-    ------
-    InputError
-        As `load_law`, or when its posterior has no such form.
-    """
-    return priors_of(load_law(run, material), unit)
 
 
 def load_law(run: Path, material: str) -> Posterior:

@@ -19,8 +19,8 @@ from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
+from tissuq.studies.fit_settings import LawSettings
 from tissuq.studies.specimen import priors_in_mpa, shared_options, warnings_of_files
-from tissuq.studies.specimen_settings import LawSettings
 from tissuq.studies.stream import open_pool
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]

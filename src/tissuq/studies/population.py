@@ -19,7 +19,7 @@ from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
 from tissuq.population.covariates import covariates_of
 from tissuq.result_warning import ResultWarning, has_code, merged, most_severe_first
-from tissuq.studies.population_settings import PopulationSettings
+from tissuq.studies.fit_settings import PopulationSettings
 
 if TYPE_CHECKING:
     from tissuq.posterior.solver import Method

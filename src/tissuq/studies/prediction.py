@@ -138,6 +138,12 @@ class Prediction:
         ratio = self.mode.paths[channel].cauchy_ratio(self.data.stretch) if self.stress_type == "cauchy" else 1.0
         return np.asarray(self.data.curves[channel].stress * ratio)
 
+    def scores_of(self, kind: bool) -> pd.DataFrame:
+        """Return how all measurements of each stress are predicted, with the discrepancy or without."""
+        assert self.scores is not None  # noqa: S101 (requested only if there are measurements)
+        is_of_kind = self.scores["discrepancy"] == ("with" if kind else "without")
+        return self.scores[is_of_kind & (self.scores["range"] == "all")]
+
     def plot(self, ax: Any = None) -> Any:
         """Draw every stress with the discrepancy, where it is known, and of the material alone: a panel each.
 
@@ -166,15 +172,19 @@ class Prediction:
         kind = self.kinds[0]
         tables = []
         for channel, name in enumerate(self.stresses):
-            bands = [self.curves[channel, kind, noise] for noise in (False, True)]
-            ends = {end: getattr(bands[0], end) for end in ("median", "low", "high")}
-            ends |= {f"predictive_{end}": getattr(bands[1], end) for end in ("low", "high")}
-            columns = self.controls | {key: values / unit.to_mpa for key, values in ends.items()}
+            columns = self.controls | self._ends(channel, kind)
             table = pd.DataFrame({key: values[rows] for key, values in columns.items()})
             table["is_calibrated"] = self.is_calibrated[rows]
             shown = headed(table, unit).to_html(index=False, float_format="{:.4g}".format)
             tables.append(f"<p>{self.mode.name}, {name} [{unit.name}]</p>{shown}")
         return "".join(tables)
+
+    def _ends(self, channel: int, kind: bool) -> dict[str, FloatArray]:
+        """Return median and ends of the band of a stress, and ends of that of a measurement, in the unit of the run."""
+        stress, noisy = (self.curves[channel, kind, noise] for noise in (False, True))
+        ends = {"median": stress.median, "low": stress.low, "high": stress.high}
+        ends |= {"predictive_low": noisy.low, "predictive_high": noisy.high}
+        return {name: values / self.unit.to_mpa for name, values in ends.items()}
 
     @property
     def table(self) -> pd.DataFrame:
@@ -193,15 +203,12 @@ class Prediction:
     def rows(self) -> list[dict[str, Any]]:
         """The rows of `table`."""
         rows: list[dict[str, Any]] = []
-        unit = self.unit
         for channel, name in enumerate(self.stresses):
             columns: dict[str, FloatArray | BoolArray] = self.controls | {"is_calibrated": self.is_calibrated}
             for kind in self.kinds:
                 prefix = "" if kind else "alone_"
-                stress, noisy = (self.curves[channel, kind, noise] for noise in (False, True))
-                bands = {end: getattr(stress, end) for end in ("median", "low", "high")}
-                bands |= {f"predictive_{end}": getattr(noisy, end) for end in ("low", "high")}
-                columns |= {f"{prefix}{name} [{unit.name}]": band / unit.to_mpa for name, band in bands.items()}
+                ends = self._ends(channel, kind)
+                columns |= {f"{prefix}{end} [{self.unit.name}]": values for end, values in ends.items()}
                 columns |= {"extrapolated": self.extrapolated[channel]} if kind else {}
             label = {"measured": name} if len(self.stresses) > 1 else {}
             values = (column.tolist() for column in columns.values())
@@ -220,23 +227,18 @@ class Prediction:
     @property
     def _group(self) -> LabelledGroup:
         along = "stretch" if self.points.ndim == 1 else "point"
-        words = {kind: "with" if kind else "without" for kind in (True, False)}
+        kinds = {kind: "with" if kind else "without" for kind in (True, False)}
         order = [*product(self.kinds, (True, False), range(len(self.stresses)))]
         shape = len(self.kinds), 2, len(self.stresses), len(self.points)
-        arrays = {
-            end: np.reshape([getattr(self.curves[channel, kind, noise], end) for kind, noise, channel in order], shape)
-            / self.unit.to_mpa
-            for end in ("median", "low", "high")
-        }
         units, dims = {"units": self.unit.name}, ("discrepancy", "noise", "stress", along)
-        by_name: dict[str, Any] = {
-            "median": (dims, arrays["median"], units | {"long_name": "median stress"}),
-            "low": (dims, arrays["low"], units | {"long_name": f"lower end of the {self.prob:.12g} interval"}),
-            "high": (dims, arrays["high"], units | {"long_name": f"upper end of the {self.prob:.12g} interval"}),
-            "is_calibrated": (along, self.is_calibrated.astype(np.int8), {"units": "1"}),
-        }
+        by_name, interval = dict[str, Any](), f"of the {self.prob:.12g} interval"
+        words = {"median": "median stress", "low": f"lower end {interval}", "high": f"upper end {interval}"}
+        for end, long_name in words.items():
+            values = [getattr(self.curves[channel, kind, noise], end) for kind, noise, channel in order]
+            by_name[end] = (dims, np.reshape(values, shape) / self.unit.to_mpa, units | {"long_name": long_name})
+        by_name["is_calibrated"] = (along, self.is_calibrated.astype(np.int8), {"units": "1"})
         coordinates: dict[str, Any] = {name: (along, column, {"units": "1"}) for name, column in self.controls.items()}
-        coordinates |= {"discrepancy": [words[kind] for kind in self.kinds], "noise": [words[True], words[False]]}
+        coordinates |= {"discrepancy": [kinds[kind] for kind in self.kinds], "noise": [kinds[True], kinds[False]]}
         coordinates |= {"stress": list(self.stresses)}
         if self.data is not None:
             stress = [self.measured(channel) for channel in range(len(self.stresses))]
@@ -323,8 +325,5 @@ def _title(prediction: Prediction, channel: int, kind: bool) -> str:
     name = f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
     if prediction.scores is None:
         return name
-    rows = prediction.scores[
-        (prediction.scores["discrepancy"] == ("with" if kind else "without")) & (prediction.scores["range"] == "all")
-    ]
-    row = rows.iloc[channel]
+    row = prediction.scores_of(kind).iloc[channel]
     return f"{name}:  {round(row['inside'] * row['count'])} of {row['count']} inside"

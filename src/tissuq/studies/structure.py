@@ -18,7 +18,7 @@ from tissuq.mechanics import Material
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.earlier_run import load, load_without_discrepancy
-from tissuq.studies.simulation_settings import SimulationSettings
+from tissuq.studies.finite_element_settings import SimulationSettings
 from tissuq.studies.stream import Step, run_tasks, silent
 
 __all__ = ["Posteriors", "SimulationSettings", "SimulationStudy", "load_posteriors", "run_simulation"]

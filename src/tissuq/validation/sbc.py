@@ -21,7 +21,7 @@ from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
-from tissuq.studies.campaign_settings import SbcOptions
+from tissuq.studies.campaign_settings import SbcOptions, each_once
 from tissuq.studies.stream import Campaign
 from tissuq.validation.coverage.fitted import fit_all, model_of, parameters_of
 from tissuq.validation.coverage.settings import BLOCK, Design
@@ -70,12 +70,7 @@ class SbcSettings(SbcOptions):
     design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
     priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
 
-    @field_validator("formulations", "noise")
-    @classmethod
-    def _each_once(cls, values: tuple[str, ...]) -> tuple[str, ...]:
-        if len(set(values)) < len(values):
-            raise ValueError("an entry is given twice, which would count the same fits twice")
-        return values
+    _once = field_validator("formulations", "noise")(each_once)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -24,7 +24,7 @@ from tissuq.model.tolerances import Tolerances
 from tissuq.parameters.priors import Prior, Uniform
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.campaign_settings import StructureStudyOptions
+from tissuq.studies.campaign_settings import StructureStudyOptions, each_once, names_among
 from tissuq.studies.settings import there_is
 from tissuq.studies.stream import Campaign
 
@@ -97,16 +97,9 @@ class StructureStudySettings(StructureStudyOptions):
     seed : int
     """
 
-    @field_validator("truths")
-    @classmethod
-    def _known_truths(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        return _all_of(names, KNOWN_LAWS, "law")
-
-    @field_validator("structures")
-    @classmethod
-    def _known_structures(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        return _all_of(names, STRUCTURES, "structure")
-
+    _once = field_validator("truths", "structures")(each_once)
+    _known_truths = field_validator("truths")(names_among(KNOWN_LAWS, "law"))
+    _known_structures = field_validator("structures")(names_among(STRUCTURES, "structure"))
     _known_modes = field_validator("modes")(there_is(_with_one_control))
     _known_estimand = field_validator("estimand")(there_is(Tolerances))
 
@@ -114,16 +107,6 @@ class StructureStudySettings(StructureStudyOptions):
     def tolerances(self) -> Tolerances:
         """Sizes of the errors of tests."""
         return Tolerances(self.estimand)
-
-
-def _all_of(names: tuple[str, ...], available: Mapping[str, object], what: str) -> tuple[str, ...]:
-    """Return names, each of which is known and given once."""
-    for name in names:
-        if name not in available:
-            raise ValueError(f"there is no {what} {name!r}; choose from {', '.join(available)}")
-    if len(set(names)) < len(names):
-        raise ValueError(f"give every {what} once")
-    return names
 
 
 DEFAULT, ORACLE = "default", "oracle"

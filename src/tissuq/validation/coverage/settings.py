@@ -15,7 +15,7 @@ from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.parameters.priors import Prior, prior_from
-from tissuq.studies.campaign_settings import CoverageOptions
+from tissuq.studies.campaign_settings import CoverageOptions, each_once, names_among
 from tissuq.studies.settings import looked_up, there_is
 from tissuq.validation.coverage.fitted import model_of, parameters_of, parts_of
 from tissuq.validation.coverage.truths import FAMILIES, FIXED, MIN_LOCKING_LIMIT, TRUTHS
@@ -100,22 +100,8 @@ class CoverageSettings(CoverageOptions):
     prob: float = Field(0.95, gt=0, lt=1)
     most_fits: int = Field(1_000_000, ge=1)
 
-    @field_validator("families", "designs", "formulations", "strengths", "noise", "unseen")
-    @classmethod
-    def _each_once(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
-        for index, value in enumerate(values):
-            if value in values[:index]:
-                raise ValueError(f"{value} is given twice, which would count the same fits twice")
-        return values
-
-    @field_validator("families")
-    @classmethod
-    def _known_families(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            if name not in TRUTHS:
-                raise ValueError(f"there is no family '{name}'; there are {', '.join(TRUTHS)}")
-        return names
-
+    _once = field_validator("families", "designs", "formulations", "strengths", "noise", "unseen")(each_once)
+    _known_families = field_validator("families")(names_among(TRUTHS, "family"))
     _known_formulations = field_validator("formulations")(there_is(_parts))
     _known_modes = field_validator("unseen")(there_is(_curve))
 

@@ -21,7 +21,7 @@ from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predictive_mixtures, speaks_of
 from tissuq.prediction.scores import interval_score, root_mean_square
-from tissuq.studies.campaign_settings import TissueOptions
+from tissuq.studies.campaign_settings import TissueOptions, each_once, names_among
 from tissuq.studies.settings import there_is
 from tissuq.studies.stream import Campaign
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
@@ -164,25 +164,12 @@ class TissueSettings(TissueOptions):
 
     points: int = Field(30, ge=4, le=10_000)
 
-    @field_validator("protocols")
-    @classmethod
-    def _known_protocols(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            if name not in PROTOCOLS:
-                raise ValueError(f"there is no protocol '{name}'; choose from {', '.join(PROTOCOLS)}")
-        return names
-
+    _once = field_validator("protocols", "formulations")(each_once)
+    _known_protocols = field_validator("protocols")(names_among(PROTOCOLS, "protocol"))
     _known_formulations = field_validator("formulations")(
         there_is(lambda name: RIVALS.get(name) or discrepancy_named(name))
     )
     _known_material = field_validator("material")(there_is(material_named))
-
-    @field_validator("protocols", "formulations")
-    @classmethod
-    def _present_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        if not names or len(set(names)) < len(names):
-            raise ValueError("give one or more names, each once")
-        return names
 
 
 @dataclass(frozen=True)
