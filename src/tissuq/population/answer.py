@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import exp
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,10 +16,11 @@ from tissuq.assessment.uses import COMPUTING, PRECISE, Use, Verdict
 from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import initial_shear_modulus
+from tissuq.population.draws import PopulationDraws
+from tissuq.population.patient import patient_band
 from tissuq.population.picture import numbers_of
-from tissuq.population.population import Population
 from tissuq.population.uses import NOT_PREDICTED, share_of_initial_stiffness, uses_of_population
-from tissuq.prediction.bands import Band
+from tissuq.prediction.bands import Band, asked_for
 from tissuq.result_warning import has_code
 
 __all__ = [
@@ -77,8 +78,8 @@ class PopulationAnswer:
         return "\n".join([*lines, *(f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses)])
 
 
-def answer_of_population(population: Population) -> PopulationAnswer:
-    """Return the answer that a population gives."""
+def answer_of_population(population: PopulationDraws, warnings: Sequence[str]) -> PopulationAnswer:
+    """Return the answer that a population with these warnings gives."""
     words, times = headline(population)
     symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
     unit = population.unit_of(symbol, population.unit())
@@ -95,15 +96,13 @@ def answer_of_population(population: Population) -> PopulationAnswer:
         estimate(f"{words}, median of the population", "median", unit.name),
         estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
     )
-    share = share_of_discrepancy(population, population.warnings)
-    uses = uses_of_population(
-        population, [*_bands(population)], population.warnings, "modulus" if words == MODULUS else words
-    )
+    share = share_of_discrepancy(population, warnings)
+    uses = uses_of_population(population, [*_bands(population)], warnings, "modulus" if words == MODULUS else words)
     law = about_law(population, share) + about_modulus(population, share, words)
     return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip())
 
 
-def _bands(population: Population) -> Iterator[Band]:
+def _bands(population: PopulationDraws) -> Iterator[Band]:
     """Yield the stress of a new specimen where specimens were measured; nothing where it cannot be predicted."""
     reach = dict[tuple[LoadingMode, int], list[float]]()
     for fit in population.posteriors.values():
@@ -111,15 +110,17 @@ def _bands(population: Population) -> Iterator[Band]:
             measured = curve.mode, curve.mode.stresses.index(curve.quantity)
             reach.setdefault(measured, []).extend([curve.abscissa.min(), curve.abscissa.max()])
     for (mode, channel), ends in reach.items():
+        stretch = np.linspace(min(ends), max(ends), POINTS)
+        of_stress: dict[str, Any] = {"prob": 0.95, "channel": channel, "discrepancy": True}
         try:
-            stretch = np.linspace(min(ends), max(ends), POINTS)
-            table = population.new_patient(stretch, mode=mode, channel=channel, unit="MPa")
+            asked_for([population.complete.solution], stretch, mode=mode, **of_stress)
+            low, median, high = patient_band(population, mode, stretch, **of_stress)
         except TissuqError:
             continue
-        yield Band(*(table[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
+        yield Band(stretch, median, low, high)
 
 
-def headline(population: Population) -> tuple[str, float]:
+def headline(population: PopulationDraws) -> tuple[str, float]:
     """Return what a page says first, and its ratio to the first parameter.
 
     The initial shear modulus where it is a multiple of the first parameter, and this parameter otherwise.
@@ -149,7 +150,7 @@ def use_of_law_alone(share: float, predicting: Use) -> Use:
     return predicting._replace(purpose=COMPUTING)
 
 
-def about_law(population: Population, share: float) -> str:
+def about_law(population: PopulationDraws, share: float) -> str:
     """Return how far the law alone is from the measurements, as a sentence after others; nothing where it is near."""
     if share <= PRECISE:
         return ""
@@ -160,7 +161,7 @@ def about_law(population: Population, share: float) -> str:
     )
 
 
-def about_modulus(population: Population, share: float, words: str) -> str:
+def about_modulus(population: PopulationDraws, share: float, words: str) -> str:
     """Return why the modulus of a law that is wrong can be right, as a sentence after others."""
     initial = share_of_initial_stiffness(population)
     if words != MODULUS or not initial <= PRECISE < share:
@@ -168,7 +169,7 @@ def about_modulus(population: Population, share: float, words: str) -> str:
     return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
 
 
-def share_of_discrepancy(population: Population, warnings: Sequence[str], at_rest: Sequence[str] = ()) -> float:
+def share_of_discrepancy(population: PopulationDraws, warnings: Sequence[str], at_rest: Sequence[str] = ()) -> float:
     """Return the share of the stress that the discrepancy carries: the median of the specimens without stress at rest.
 
     Zero where it is not known of most specimens, or which of them have stress at rest.

@@ -12,6 +12,7 @@ import numpy as np
 from tissuq.arrays import FloatArray
 from tissuq.experiments.checked_arrays import headed
 from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.parameters.checks import check_probability
 from tissuq.population.covariates import Covariates, covariates_of
 from tissuq.population.likelihoods import Coordinates
 from tissuq.posterior.netcdf import LabelledGroup
@@ -123,6 +124,38 @@ class PopulationDraws:
         """Return the unit of a parameter where stresses are in a unit: that one, or none of a plain number."""
         parameters = self.complete.model.parameters
         return unit if next(p for p in parameters if p.symbol == symbol).unit else StressUnit("", 1.0)
+
+    def summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
+        """Return median and interval of every pooled parameter, by partial and by complete pooling.
+
+        Parameters
+        ----------
+        prob : float
+            Probability inside the intervals.
+        unit : str, optional
+            Unit of stress; that of the measurements unless given, MPa where theirs differ.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter and quantity: ``median`` (of the population), ``spread`` (between specimens: sd of the
+            logarithm, or of a parameter of either sign itself), ``new patient``, and ``complete pooling``, whose
+            interval is one for specimens that were all the same: it is no range of patients. Columns median, hdi_low
+            and hdi_high; the unit of stresses stands at their head.
+        """
+        import pandas as pd
+
+        check_probability(prob)
+        rows = {}
+        for index, (symbol, is_log) in enumerate(zip(self.symbols, self.coordinates.is_log, strict=True)):
+            factor = self.unit_of(symbol, self.unit(unit)).to_mpa
+            for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
+                is_ratio = name == "spread" and is_log
+                rows[symbol, name] = np.array(interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
+            marginal = self.complete.marginals[symbol]
+            rows[symbol, "complete pooling"] = np.array([marginal.quantile(0.5), *marginal.hdi(prob)]) / factor
+        index_of_rows = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
+        return headed(pd.DataFrame(list(rows.values()), index_of_rows, INTERVAL_COLUMNS), self.unit(unit))
 
 
 def interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:

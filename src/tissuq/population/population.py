@@ -16,12 +16,13 @@ from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.parameters.checks import check_probability
+from tissuq.population.answer import PopulationAnswer, answer_of_population
 from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, effect_table, interval, labelled_arrays
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.population.sample_size import needed_table
 from tissuq.population.shared_error import shared_covariance, width_table
-from tissuq.population.warnings import MIN_EFFECTIVE_SHARE, warnings_of
+from tissuq.population.warnings import has_converged, warnings_of
 from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tissuq.inference.enumerators.nuts import NutsDraws
-    from tissuq.population.answer import PopulationAnswer
 
 __all__ = ["Population"]
 
@@ -82,9 +82,7 @@ class Population(PopulationDraws):
     @property
     def converged(self) -> bool:
         """Whether sampling of the population, and of every separate fit of a specimen, has converged."""
-        fits = (*self.posteriors.values(), self.complete)
-        is_corrected = self.hierarchy.effective > MIN_EFFECTIVE_SHARE
-        return self.diagnostics.converged and is_corrected and not any(fit.solution.is_approximate for fit in fits)
+        return has_converged(self)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -106,41 +104,7 @@ class Population(PopulationDraws):
         >>> answer.estimates[0].name, [str(use.verdict) for use in answer.uses]
         ('initial shear modulus of a new specimen', ['with care', 'no', 'no'])
         """
-        from tissuq.population.answer import answer_of_population
-
-        return answer_of_population(self)
-
-    def summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
-        """Return median and interval of every pooled parameter, by partial and by complete pooling.
-
-        Parameters
-        ----------
-        prob : float
-            Probability inside the intervals.
-        unit : str, optional
-            Unit of stress; that of the measurements unless given, MPa where theirs differ.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Indexed by parameter and quantity: ``median`` (of the population), ``spread`` (between specimens: sd of the
-            logarithm, or of a parameter of either sign itself), ``new patient``, and ``complete pooling``, whose
-            interval is one for specimens that were all the same: it is no range of patients. Columns median, hdi_low
-            and hdi_high; the unit of stresses stands at their head.
-        """
-        import pandas as pd
-
-        check_probability(prob)
-        rows = {}
-        for index, (symbol, is_log) in enumerate(zip(self.symbols, self.coordinates.is_log, strict=True)):
-            factor = self.unit_of(symbol, self.unit(unit)).to_mpa
-            for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
-                is_ratio = name == "spread" and is_log
-                rows[symbol, name] = np.array(interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
-            marginal = self.complete.marginals[symbol]
-            rows[symbol, "complete pooling"] = np.array([marginal.quantile(0.5), *marginal.hdi(prob)]) / factor
-        index_of_rows = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
-        return headed(pd.DataFrame(list(rows.values()), index_of_rows, INTERVAL_COLUMNS), self.unit(unit))
+        return answer_of_population(self, self.warnings)
 
     def specimen_summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
         """Return every specimen's parameters from its separate fit and within the population.

@@ -9,9 +9,9 @@ import numpy as np
 
 from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, Use, Verdict, precision_of, relative_half_width, worst_of
+from tissuq.population.draws import PopulationDraws
 from tissuq.population.picture import numbers_of
-from tissuq.population.population import Population
-from tissuq.population.warnings import far_specimens, has_few_specimens
+from tissuq.population.warnings import far_specimens, has_converged, has_few_specimens
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import Band
 from tissuq.result_warning import Severity, has_code
@@ -32,7 +32,7 @@ DEPARTING = "the fitted curves of most specimens depart from the measured ones, 
 
 
 def uses_of_population(
-    population: Population,
+    population: PopulationDraws,
     bands: Sequence[Band],
     warnings: Sequence[str],
     quantity: str = "modulus",
@@ -42,7 +42,7 @@ def uses_of_population(
 
     Parameters
     ----------
-    population : Population
+    population : PopulationDraws
     bands : sequence of Band
         Of the stress of a new specimen, without noise, where specimens were measured; none where it is not predicted.
     warnings : sequence of str
@@ -64,17 +64,17 @@ def uses_of_population(
     )
 
 
-def share_of_initial_stiffness(population: Population) -> float:
+def share_of_initial_stiffness(population: PopulationDraws) -> float:
     """Return the share of the initial stiffness that the discrepancy carries: the median of the specimens."""
     shares = [abs(shares_of_discrepancy(fit.solution)[1][0]) for fit in population.posteriors.values()]
     return float(np.median(shares))
 
 
-def _reason_against(population: Population, warnings: Sequence[str], at_rest: Sequence[str]) -> str:
+def _reason_against(population: PopulationDraws, warnings: Sequence[str], at_rest: Sequence[str]) -> str:
     """Return what stands against any use; nothing where nothing does."""
     far = ", ".join(far_specimens(population))
     reasons = {
-        "sampling has not converged": not population.converged,
+        "sampling has not converged": not has_converged(population),
         "what was read of the files is doubtful, as the warning says": has_code(warnings, "doubtful-reading"),
         f"{far} differs from the others as much as by a mistaken unit, as the warning says": bool(far),
         f"there is stress at rest{_of_few(population, at_rest)}, so that moduli may be off by far more than their "
@@ -87,12 +87,12 @@ def _reason_against(population: Population, warnings: Sequence[str], at_rest: Se
     return found or _against_most_fits(population)
 
 
-def _of_few(population: Population, names: Sequence[str]) -> str:
+def _of_few(population: PopulationDraws, names: Sequence[str]) -> str:
     """Return which specimens it is of, as the end of a clause, where these are less than half."""
     return f" in {', '.join(names)}" if 0 < 2 * len(names) < len(population.names) else ""
 
 
-def _are_beside(population: Population, names: Sequence[str]) -> bool:
+def _are_beside(population: PopulationDraws, names: Sequence[str]) -> bool:
     """Return whether specimens are less than half, and their moduli move the middle of all within its interval."""
     if not _of_few(population, names):
         return False
@@ -105,13 +105,13 @@ def _are_beside(population: Population, names: Sequence[str]) -> bool:
     return bool(shift <= _half_width(population))
 
 
-def _half_width(population: Population) -> float:
+def _half_width(population: PopulationDraws) -> float:
     """Return half the 95 % interval of the median over specimens of the first pooled parameter, over that median."""
     numbers = numbers_of(population.summary(unit="MPa"))[population.symbols[0], "median"]
     return float((numbers["hdi_high"] - numbers["hdi_low"]) / 2 / abs(numbers["median"]))
 
 
-def _against_most_fits(population: Population) -> str:
+def _against_most_fits(population: PopulationDraws) -> str:
     """Return what stands against any use of the separate fits of more than half of the specimens."""
     fits = population.posteriors.values()
     counts = Counter(
@@ -123,7 +123,7 @@ def _against_most_fits(population: Population) -> str:
     return next((reason for code, reason in reasons.items() if 2 * counts[code] > len(fits)), "")
 
 
-def _reporting(population: Population) -> tuple[Verdict, str]:
+def _reporting(population: PopulationDraws) -> tuple[Verdict, str]:
     """Return whether the median of the population can be reported."""
     carried = share_of_initial_stiffness(population)
     if carried > PRECISE:
@@ -133,7 +133,7 @@ def _reporting(population: Population) -> tuple[Verdict, str]:
     return _beside_law(population, verdict, f"median over specimens {width}")
 
 
-def _predicting(population: Population, bands: Sequence[Band]) -> tuple[Verdict, str]:
+def _predicting(population: PopulationDraws, bands: Sequence[Band]) -> tuple[Verdict, str]:
     """Return whether the stress of a specimen that was not measured can be predicted, where others were."""
     if not bands:
         return Verdict.NO, NOT_PREDICTED
@@ -161,7 +161,7 @@ def _beside_measurements(
     return verdict, sentence
 
 
-def _beside_law(population: Population, verdict: Verdict, sentence: str) -> tuple[Verdict, str]:
+def _beside_law(population: PopulationDraws, verdict: Verdict, sentence: str) -> tuple[Verdict, str]:
     """Return a verdict that holds where the law is right, if no error of it was allowed for."""
     if population.complete.model.discrepancy.parameters:
         return verdict, sentence

@@ -47,6 +47,14 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def has_converged(population: PopulationDraws) -> bool:
+    """Return whether sampling of the population, and of every separate fit of a specimen, has converged."""
+    fits = (*population.posteriors.values(), population.complete)
+    hierarchy = population.hierarchy
+    is_corrected = hierarchy.effective > MIN_EFFECTIVE_SHARE
+    return hierarchy.diagnostics.converged and is_corrected and not any(fit.solution.is_approximate for fit in fits)
+
+
 def has_few_specimens(population: PopulationDraws) -> bool:
     """Return whether there are so few specimens that the prior of the spread has much influence."""
     return len(population.names) - len(population.covariates.effects) < MIN_SPECIMENS_FOR_SPREAD
