@@ -331,7 +331,7 @@ CASES: dict[str, Case] = {
     "noise-repeats": fit_case(repeated, discrepancy="yeoh", noise="repeats", is_quick=True),
     "noise-repeats-auto": fit_case(repeated, discrepancy="auto", noise="repeats"),
     "noise-autoregressive": fit_case(drifting, discrepancy="none", noise="autoregressive", is_quick=True),
-    "noise-autoregressive-auto": fit_case(drifting, discrepancy="auto", noise="autoregressive"),
+    "noise-autoregressive-auto": fit_case(drifting, discrepancy="auto", noise="autoregressive", tolerances="as-tested"),
     "one-test-tolerances": tissue(
         discrepancy="auto", noise_sd=0.02, tolerances=tq.Tolerances(stress=0.1, length=0.02, slack=0.005, zero=0.01)
     ),

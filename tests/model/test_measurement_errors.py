@@ -156,6 +156,11 @@ def test_one_file_of_one_test_is_as_tested_where_its_errors_are_known_or_taken_u
     assert not tq.fit(test, discrepancy="constant").model.tolerances
 
 
+def test_correlated_noise_beside_an_energy_leaves_errors_of_the_test_in_the_interval():
+    test = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
+    assert tq.fit(test, discrepancy="taylor", noise="autoregressive").model.tolerances == Tolerances("specimen")
+
+
 def test_several_controls_have_an_error_of_length_and_slack_each():
     along = np.linspace(0.02, 0.2, 9)
     sheet = np.column_stack([1 + along, 1 + 0.5 * along])

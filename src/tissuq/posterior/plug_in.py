@@ -296,13 +296,15 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
     """Return the tolerances of a model for which the user gives none.
 
     Those of the specimen, or where tests are of several, of the tissue. None where something else takes up errors of
-    the test (a discrepancy with errors of its own, noise that is more than one number), and of one test with known
-    noise. Errors that the measurements themselves show are included at least as large.
+    the test (a discrepancy with errors of its own, noise that is more than one number or, without a discrepancy,
+    correlated), and of one test with known noise. Errors that the measurements themselves show are included at least as
+    large.
     """
     if model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy:
         return Tolerances()
     discrepancy = model.discrepancy
-    takes_up_errors = model.noise.is_consecutive or discrepancy.is_scattered or not discrepancy.is_energy
+    is_misfit_noise = model.noise.is_consecutive and not model.energy_symbols
+    takes_up_errors = is_misfit_noise or discrepancy.is_scattered or not discrepancy.is_energy
     if specimens_of(model.experiment).shape[1] > 1:
         return (BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)).at_least(model.experiment.least_errors)
     is_known = len(model.experiment.tests) == 1 and not model.noise.parameters
