@@ -220,13 +220,24 @@ def test_a_long_file_has_the_errors_of_a_test_as_a_short_one_has():
 
 def test_means_of_measurements_tell_what_all_of_them_do():
     every = tq.fit(long_test(), noise_sd=0.02, discrepancy="none").summary().loc["C10"]
-    means = tq.fit(long_test(), tolerances=tq.Tolerances(slack=1e-7), discrepancy="none").summary()
-    assert means.loc["C10", "mean"] == pytest.approx(every["mean"], abs=0.05 * every["sd"])
-    assert means.loc["C10", "sd"] == pytest.approx(every["sd"], rel=0.05)
-    assert means.loc["noise_sd", "mean"] == pytest.approx(0.02 / np.sqrt(12), rel=0.05)
+    options = {"tolerances": tq.Tolerances(slack=1e-7), "discrepancy": "none"}
+    unknown, known = (tq.fit(long_test(), noise_sd=noise, **options) for noise in (None, 0.02))
+    for fit, tolerance in ((unknown, 0.05), (known, 1e-4)):
+        means = fit.summary()
+        assert fit.model.experiment.size == 2000
+        assert means.loc["C10", "mean"] == pytest.approx(every["mean"], abs=0.05 * every["sd"])
+        assert means.loc["C10", "sd"] == pytest.approx(every["sd"], rel=tolerance)
+    assert unknown.summary().loc["noise_sd", "mean"] == pytest.approx(0.02 / np.sqrt(12), rel=0.05)
 
 
-def test_measurements_of_known_noise_or_without_errors_of_the_test_are_not_averaged():
+def test_known_noise_of_means_is_that_of_each_test():
+    long, short = long_test(), long_test(seed=1).where(np.arange(0, len(LONG), 300))
+    fit = tq.fit([long, short], noise_sd=0.02, discrepancy="none")
+    assert [len(curve) for curve in fit.model.experiment.curves] == [1000, 80]
+    np.testing.assert_allclose(fit.model.noise_of_tests[0], [0.02 / np.sqrt(24), 0.02])
+
+
+def test_measurements_without_errors_of_the_test_are_not_averaged():
     stretch, sign = np.repeat(LONG[::10], 2), (-1) ** np.arange(4_800)
     data = tq.Experiment("uniaxial", stretch, stretch - 1 + 1e-3 * sign)
     for options in ({"noise_sd": 0.02}, {"tolerances": "as-tested"}, {"noise": "repeats"}):

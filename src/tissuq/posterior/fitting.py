@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Unpack
 
+import numpy as np
+
 from tissuq.assessment.stable_posterior import modes_named
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -53,9 +55,9 @@ def fit(
     data : Experiment, str, path or table, or sequence of these
         The measurements: of one test, or of several in any modes, which share one material. A discrepancy that is an
         energy acts in all of them; one in stress is another in each test, of the same size. Files and tables (of
-        pandas, polars, xarray) are read as by `tissuq.read`. Of more than 2000 stresses, with unknown noise, means of
-        consecutive ones are fitted (`Experiment.averaged`): noise is then that of means. With the noise known, or
-        tolerances that are none, every measurement is.
+        pandas, polars, xarray) are read as by `tissuq.read`. Of more than 2000 stresses, means of consecutive ones are
+        fitted (`Experiment.averaged`) and noise_sd is that of means, a known one divided by the root of their number;
+        every measurement without errors of the test (tolerances that are none, one test with known noise).
     discrepancy : str or Discrepancy
         What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object; ``"auto"`` is
         an average of strain energies that leave the initial shear modulus alone, by the evidence.
@@ -200,14 +202,13 @@ def fit_many(
     if noise_sd is not None and noise is not None:
         raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
     noise_model = noise_named(noise if noise is not None else "unknown" if noise_sd is None else noise_sd)
-    options = material_named(material), discrepancy_named(discrepancy), noise_model, dict(priors or {})
+    parts = material_named(material), discrepancy_named(discrepancy)
     solver = Solver(method, modes_named(stable_in), int(seed))
 
-    is_averaged = bool(noise_model.parameters) and not noise_model.shares_discrepancy
-    is_averaged = is_averaged and (tolerances is None or bool(tolerances))
-
     def model_of(data: Experiment) -> StatisticalModel:
-        data = data.averaged(MAX_SIZE) if is_averaged else data
+        is_quick = not tolerances and (tolerances is not None or (not noise_model.parameters and len(data.tests) == 1))
+        rows = data if is_quick or noise_model.shares_discrepancy else data.averaged(MAX_SIZE)
+        data, options = rows, (*parts, _noise_of_means(noise_model, rows), dict(priors or {}))
         stated = tolerances.at_least(data.least_errors) if tolerances else tolerances or Tolerances()
         model = StatisticalModel(data, *options, stated)
         standard = default_tolerances(model).replaced_by(replacing) if tolerances is None else stated
@@ -229,6 +230,15 @@ def fit_many(
         solutions = solver.solve([models[number] for number in numbers])
         posteriors |= {number: Posterior(solution, solver) for number, solution in zip(numbers, solutions, strict=True)}
     return [posteriors[number] for number in range(len(datasets))]
+
+
+def _noise_of_means(noise: Noise, rows: Experiment) -> Noise:
+    """Return the noise of rows that are means, of tests of which each has a known one; another noise as it is."""
+    counts = np.array([test.curves[0].averaged for test in rows.tests])
+    if noise.parameters or (counts == 1).all():
+        return noise
+    sds = noise.of_tests(rows) / np.sqrt(counts)
+    return noise_named(float(sds[0]) if len(sds) == 1 else tuple(sds.tolist()))
 
 
 def _refuse_several(material: Any, priors: Any, mode: Any) -> None:
