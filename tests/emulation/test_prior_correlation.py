@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 import tissuq as tq
 from tissuq.emulation.problem import correlated
 from tissuq.errors import InputError
-from tissuq.studies.earlier_run import priors_of, priors_of_run
+from tissuq.studies.earlier_run import load_law, priors_of
 
 PRIORS = {"mu": tq.LogNormal(2.0, 0.3), "alpha": tq.Normal(-8.0, 1.5), "b": tq.Uniform(0.0, 1.0)}
 CORRELATION = -0.8
@@ -98,14 +98,14 @@ def test_of_a_run_of_several_laws_the_one_of_the_model_is_the_prior_and_of_sever
             law, discrepancy = (name, "none") if folder == "laws" else ("neo-hookean", name)
             posterior = tq.fit(data, material=law, discrepancy=discrepancy, noise_sd=0.01)
             posterior.save(tmp_path / folder / "posterior" / f"{name}.nc")
-    assert list(priors_of_run(tmp_path / "laws", "yeoh", "MPa")[0]) == ["C10", "C20", "C30"]
+    assert list(priors_of(load_law(tmp_path / "laws", "yeoh"), "MPa")[0]) == ["C10", "C20", "C30"]
     (tmp_path / "laws" / "run.toml").write_text('laws = ["neo-hookean", "yeoh"]\n')
     with pytest.raises(InputError, match=r"of the materials neo-hookean, yeoh, .* --material gent"):
-        priors_of_run(tmp_path / "laws", "gent", "MPa")
+        priors_of(load_law(tmp_path / "laws", "gent"), "MPa")
     file = tmp_path / "several" / "posterior" / "none.nc"
     with pytest.raises(InputError, match=f"several posteriors: .* --prior-run .* or {re.escape(str(file))}"):
-        priors_of_run(tmp_path / "several", "neo-hookean", "MPa")
-    (prior,) = priors_of_run(file, "neo-hookean", "MPa")[0].values()
+        priors_of(load_law(tmp_path / "several", "neo-hookean"), "MPa")
+    (prior,) = priors_of(load_law(file, "neo-hookean"), "MPa")[0].values()
     assert prior.median == pytest.approx(0.5, rel=0.05)
     with pytest.raises(InputError, match="fit the tests with --material yeoh"):
-        priors_of_run(file, "yeoh", "MPa")
+        priors_of(load_law(file, "yeoh"), "MPa")

@@ -66,6 +66,8 @@ def mode_of_tube(table: Table, options: ReadingOptions) -> tuple[str, str]:
     has_stress = any(quantity in ROLES["stress"] | STRESS_NOUNS for quantity in quantities)
     if not {PRESSURE, *DIAMETERS, *FORCES, *ROLES_BESIDE}.issuperset(columns) or has_stress:
         return "", ""
+    if PRESSURE not in columns and not [*_of_role(table, quantities, PRESSURE, may_be_held=True)]:
+        return "", ""
     has_force = bool(columns.keys() & {*FORCES} or _forces(table, quantities))
     has_stretch = column_of_axial_stretch(table, options) is not None
     may_be_held = has_force and (has_stretch or options.get("axial_stretch") is not None)
