@@ -24,6 +24,8 @@ MAX_WIDTH_OF_MEANS = 0.05
 """Of a control over its range, within half of the groups of measurements that are averaged, and between two."""
 MAX_GROUPS_FACTOR = 2
 """Groups over those of measurements without jumps, beyond which measurements are not in order."""
+MIN_ROWS = 200
+"""Rows that a curve keeps at least where consecutive measurements are averaged."""
 MOST_SMALL = 2
 """Curves of a notebook's figure at the most."""
 
@@ -110,7 +112,7 @@ class Curve:
         Neighbours where consecutive measurements lie far apart, as repeated or shuffled ones do. Where these have
         several controls, and neighbours in one of them differ in others, all measurements are left.
         """
-        count = -(-len(self) // rows)
+        count = -(-len(self) // max(rows, MIN_ROWS))
         if count == 1:
             return self
         controls = self.points.reshape(len(self), -1)
@@ -134,7 +136,8 @@ def _groups(controls: FloatArray, count: int) -> tuple[IndexArray, float]:
 
     Jumps and widths are of the controls over their ranges, for these the largest of all controls.
     """
-    shares = controls / np.where(np.ptp(controls, axis=0) > 0, np.ptp(controls, axis=0), 1.0)
+    reach = np.ptp(controls, axis=0)
+    shares = controls / np.where(reach > 0, reach, 1.0)
     is_jump = np.append(True, (np.abs(np.diff(shares, axis=0)) > MAX_WIDTH_OF_MEANS).any(axis=1))
     rows = np.arange(len(controls))
     starts = np.flatnonzero((rows - np.maximum.accumulate(np.where(is_jump, rows, 0))) % count == 0)

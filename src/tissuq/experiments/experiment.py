@@ -24,10 +24,6 @@ from tissuq.experiments.units import stress_unit as stress_unit_of
 __all__ = ["Experiment"]
 
 
-MIN_ROWS = 200
-"""Rows that a curve keeps at least where consecutive measurements are averaged."""
-
-
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Experiment:
     """Measurements of one test: what it set, such as stretches, and the stresses. `Experiment.of` joins several tests.
@@ -353,7 +349,7 @@ class Experiment:
         Parameters
         ----------
         size : int
-            Of all curves together, which share it equally; none is left with fewer rows than `MIN_ROWS`.
+            Of all curves together, which share it equally; none is left with fewer than 200 rows by that.
 
         Examples
         --------
@@ -365,8 +361,7 @@ class Experiment:
         """
         if self.size <= size:
             return self
-        rows = max(size // len(self.curves), MIN_ROWS)
-        return self._of_curves(curve.of_means(rows) for curve in self.curves)
+        return self._of_curves(curve.of_means(size // len(self.curves)) for curve in self.curves)
 
     @property
     def rows_name(self) -> str:

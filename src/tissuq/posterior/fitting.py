@@ -207,8 +207,9 @@ def fit_many(
 
     def model_of(data: Experiment) -> StatisticalModel:
         is_quick = not tolerances and (tolerances is not None or (not noise_model.parameters and len(data.tests) == 1))
-        rows = data if is_quick or noise_model.shares_discrepancy else data.averaged(MAX_SIZE)
-        data, options = rows, (*parts, _noise_of_means(noise_model, rows), dict(priors or {}))
+        if not (is_quick or noise_model.shares_discrepancy):
+            data = data.averaged(MAX_SIZE)
+        options = *parts, _noise_of_means(noise_model, data), dict(priors or {})
         stated = tolerances.at_least(data.least_errors) if tolerances else tolerances or Tolerances()
         model = StatisticalModel(data, *options, stated)
         standard = default_tolerances(model).replaced_by(replacing) if tolerances is None else stated
