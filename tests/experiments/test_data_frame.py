@@ -134,6 +134,11 @@ def test_a_long_data_frame_is_taken_as_numbers_and_many_gaps_in_it_are_refused()
     [
         (None, {}, r"measurements are needed: .*Not None"),
         (42, {}, r"measurements are needed: .*Not 42"),
+        (
+            "rubber-treloar-planar",
+            {},
+            r"no such file\. The data set .*tissuq\.datasets\.load\('rubber-treloar-planar'\)",
+        ),
         ([1.0, 1.1], {}, r"measurements are needed: .*Not 1\.0"),
         (np.eye(2), {}, r"measurements are needed: .*makes of arrays"),
         (FRAME[["lambda"]], {}, r"^DataFrame: expected a column of stretches and one of stresses"),
@@ -142,6 +147,7 @@ def test_a_long_data_frame_is_taken_as_numbers_and_many_gaps_in_it_are_refused()
         ({"stretch": [1.0, 1.1], "stress": [[0.0]]}, {}, r"'stress' must be one-dimensional"),
         (FRAME, {"strech": "lambda"}, r"no option 'strech'. Did you mean 'stretch'"),
         (FRAME, {"matreial": "gent"}, r"no option 'matreial'. Did you mean 'material'"),
+        (FRAME, {"estimand": "as-tested"}, r"no option 'estimand'. Did you mean 'tolerances'"),
         (FRAME, {"stress": STRESS}, r"stress must be the name of a column.*not of type ndarray"),
         (FRAME, {"displacement": "position (mm)", "length": 20}, r"the length '20' has no unit"),
         (FRAME, {"unit": "kPa", "stress_unit": "kPa"}, r"unit and stress_unit are the same"),

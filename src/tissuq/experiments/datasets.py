@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import read_experiment
+from tissuq.experiments.reading.text_file import DATA_SETS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["citation", "copy", "load", "names", "path", "table"]
-
-FOLDER = Path(__file__).parent / "data"
 
 
 def names() -> list[str]:
@@ -29,7 +28,7 @@ def names() -> list[str]:
     >>> names()[:3]
     ['brain-cortex-shear', 'brain-cortex-uniaxial', 'rubber-treloar-equibiaxial']
     """
-    return sorted(file.stem for file in FOLDER.glob("*.csv"))
+    return sorted(file.stem for file in DATA_SETS.glob("*.csv"))
 
 
 def path(name: str) -> Path:
@@ -44,7 +43,7 @@ def path(name: str) -> Path:
         close = get_close_matches(str(name), names(), n=1)
         hint = f" Did you mean '{close[0]}'?" if close else ""
         raise InputError(f"there is no data set named '{name}'.{hint} Choose one of: {', '.join(names())}.")
-    return FOLDER / f"{name}.csv"
+    return DATA_SETS / f"{name}.csv"
 
 
 def citation(name: str) -> str:

@@ -106,6 +106,8 @@ COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "slidi
 PARTS = {name: "columns" for role in COLUMNS for name in (role, f"{role}2")}
 PARTS |= dict.fromkeys(ROLES_OF_TUBE, "columns") | dict.fromkeys(DIMENSION_NAMES, "dimensions")
 """Options that are entries of another one."""
+NAMES_OF_SHELL = {"estimand": "tolerances"}
+"""Options of the shell that have another name in Python."""
 
 
 def spelled_out(
@@ -137,7 +139,9 @@ def spelled_out(
         option = PARTS.get(name) or ("stress_unit" if name == "unit" else name)
         if option not in known_names:
             names = [*known_names, *PARTS, "unit", *more_names]
-            close = get_close_matches(name, names, n=1)
+            close = [
+                other for other in (NAMES_OF_SHELL.get(name), *get_close_matches(name, names, n=1)) if other in names
+            ]
             hint = f" Did you mean '{close[0]}'?" if close else f" There are: {', '.join(names)}."
             raise InputError(f"there is no option '{name}'.{hint}")
         if name in PARTS and value is not None:

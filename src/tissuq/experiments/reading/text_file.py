@@ -10,8 +10,10 @@ from pathlib import Path
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import without_marks
 
-__all__ = ["read_lines"]
+__all__ = ["DATA_SETS", "read_lines"]
 
+DATA_SETS = Path(__file__).parents[1] / "data"
+"""Folder of the measured curves that come with the package."""
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_TEXT = {
     b"%PDF": "a PDF document",
@@ -97,6 +99,8 @@ def _content(path: Path) -> bytes:
 
 
 def _close_file(path: Path) -> str:
+    if (DATA_SETS / f"{path}.csv").is_file():
+        return f" The data set of that name, which comes with tissuq, is tissuq.datasets.load('{path}')."
     neighbours = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
     close = get_close_matches(path.name, neighbours, n=1)
     return f" Did you mean '{path.parent / close[0]}'?" if close else " Check the name and the folder."
