@@ -26,7 +26,7 @@ from tissuq.inference.enumerators.amplitudes import (
     noise_grid,
 )
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Reduced
-from tissuq.inference.enumerators.nodes import OUTER_STEP, Node, single_nodes
+from tissuq.inference.enumerators.nodes import OUTER_STEP, SETTINGS_AT_ONCE, Node, single_nodes
 from tissuq.inference.enumerators.outer import Outer
 from tissuq.inference.enumerators.outer_search import Guide, weighted_nodes
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -253,13 +253,16 @@ class _EnergySums:
         features = {int(member): self.model.energy_features(member) for member in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in blocks) for blocks in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
-        for number in np.unique(node):
-            rows = self._outer.rows(self._nodes[number].outer[None])
-            for member in np.unique(points.lattice[node == number]):
-                of_member = np.flatnonzero((node == number) & (points.lattice == member))
+        numbers, data_sets = np.unique(node, return_inverse=True)
+        outer = np.array([self._nodes[number].outer for number in numbers])
+        for alike in self._outer.alike(outer, SETTINGS_AT_ONCE):
+            rows, is_alike = self._outer.rows(outer[alike]), np.isin(data_sets, alike)
+            for member in np.unique(points.lattice[is_alike]):
+                of_member = np.flatnonzero(is_alike & (points.lattice == member))
                 amplitudes = points.amplitudes[of_member][:, list(self.model.energy_members[member].amplitude_indices)]
-                reduced = Reduced(rows, features[member])
-                linear_mean, linear_root = reduced.linear_and_weights(0, amplitudes, points.noise_sd[of_member])
+                linear_mean, linear_root = Reduced(rows, features[member]).linear_and_weights(
+                    data_sets[of_member] - alike[0], amplitudes, points.noise_sd[of_member]
+                )
                 linear_mean, linear_root, _ = self._priors.times(linear_mean, linear_root)
                 q = linear_mean.shape[1]
                 mean[of_member, :q], root[of_member, :q, :q] = linear_mean, linear_root

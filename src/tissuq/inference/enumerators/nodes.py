@@ -15,7 +15,7 @@ from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["OUTER_STEP", "Node", "Sums", "single_nodes"]
+__all__ = ["OUTER_STEP", "SETTINGS_AT_ONCE", "Node", "Sums", "single_nodes"]
 
 
 UNLIKELY_PROBABILITY = 1e-3
