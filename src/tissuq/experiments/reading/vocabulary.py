@@ -8,6 +8,7 @@ from unicodedata import normalize
 from tissuq.experiments.units import measured_in
 
 __all__ = [
+    "AXIAL_STRAIN",
     "AXIAL_STRETCH",
     "COUNT_NAMES",
     "CYCLE_NAMES",
@@ -216,11 +217,16 @@ ROLE_OF_AXIAL_STRETCH = "axial_stretch"
 
 
 AXIAL_STRETCH = re.compile(
-    r"(axial|longitudinal|z) (stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?(z|axial)|in ?vivo stretch|"
+    r"(axial|longitudinal|z) (pre ?)?(stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?(z|axial)|pre ?stretch( ratio)?|"
+    r"(in ?vivo) (axial |longitudinal )?stretch( ratio)?|"
     r"(axiale|longitudinale) (dehnung|streckung)|[ée]tirement (axial|longitudinal)|estiramiento (axial|longitudinal)|"
     r"轴向拉伸比?|осевая степень растяжения"
 )
 """Names of a column that is one where there are columns of a tube, too."""
+
+
+AXIAL_STRAIN = re.compile(r"(axial|longitudinal) (pre ?)?strain")
+"""Likewise, of a strain, where a line states it."""
 
 
 LENGTH_OF_TUBE = re.compile(
