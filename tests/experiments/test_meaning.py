@@ -294,3 +294,40 @@ def test_a_name_that_stands_twice_is_asked_about_in_its_role(tmp_path):
     path = written(tmp_path, "test.csv", "Strain (%),Strain (%),Stress (kPa)", 100 * (L - 1), 50 * (L - 1), P)
     with pytest.raises(InputError, match=r"several columns may be the strain: .* --column strain=NAME"):
         tq.read(path, columns={"strain": "Strain (%)"})
+
+
+SHEET = {"length": "10 mm", "width": "20 mm", "thickness": "2 mm"}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "lambda_x,lambda_y,Fx (N),Fy (N)",
+        "lambda_y,F_y (N),lambda_x,F_x (N)",
+        "lambda1,lambda2,F1 (N),F2 (N)",
+        "stretch_1,stretch_2,force_1 (N),force_2 (N)",
+    ],
+)
+def test_two_stretches_and_two_forces_are_of_both_axes_of_a_sheet_whose_sizes_are_given(tmp_path, names):
+    across = 1 + (L - 1) / 2
+    values = {"x": (L, 0.04 * P), "y": (across, 0.01 * P)}  # N of kPa on 20 mm x 2 mm, and half of them on 10 mm x 2 mm
+    columns = []
+    for name in names.replace("1", "x").replace("2", "y").split(","):
+        axis = name.removesuffix(" (N)")[-1]
+        columns.append(values[axis]["N" in name])
+    path = written(tmp_path, "sheet.csv", names, *columns)
+    check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1), dimensions=SHEET)
+
+
+@pytest.mark.parametrize(
+    ("names", "options"),
+    [
+        ("stretch_1,force_1 (N),stretch_2,force_2 (N)", {"dimensions": SHEET}),  # of two specimens, one after another
+        ("stretch_1,stretch_2,force_1 (N),force_2 (N)", {"area": "2 mm2"}),
+        ("displacement_1 (mm),displacement_2 (mm),force_1 (N),force_2 (N)", {"dimensions": SHEET}),
+    ],
+)
+def test_numbers_that_may_be_those_of_specimens_are_asked_about(tmp_path, names, options):
+    path = written(tmp_path, "sheet.csv", names, L, L, P, P)
+    with pytest.raises(InputError, match=r"mode='biaxial'.* If numbers in the names are of two specimens"):
+        tq.read(path, **options)
