@@ -223,6 +223,27 @@ def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_read
     check(path, "planar", mode="planar", columns={"stretch": 1})
 
 
+@pytest.mark.parametrize(
+    ("names", "count"),
+    [
+        ("Strain,Force (N),Stress (MPa),Strain,Force (N),Stress (MPa)", 2),
+        ("Strain A,Force A (N),Stress A (MPa),Strain B,Force B (N),Stress B (MPa)", 1),
+    ],
+)
+def test_a_force_over_1_mm2_is_asked_about_of_tests_side_by_side_too(tmp_path, names, count):
+    path = written(tmp_path, "export.csv", names, L - 1, N, N, L - 1, 2 * N, 2 * N)
+    strain, force, stress = names.split(",")[:3]
+    advice = (
+        f'--column strain="{strain}" --column force="{force}", and the --area .*{strain}" --column stress="{stress}"'
+    )
+    with pytest.raises(InputError, match=advice.replace("(", r"\(").replace(")", r"\)")):
+        tq.read_tests(path)
+    tests = tq.read_tests(path, columns={"strain": strain, "force": force}, area="4 mm2")
+    assert len(tests) == count
+    for number, test in enumerate(tests, 1):
+        np.testing.assert_allclose(test.stress, 1e-3 * number * P, rtol=1e-5, atol=1e-9)
+
+
 def test_an_area_of_1_mm2_that_is_meant_is_read_as_stated(tmp_path):
     path = written(tmp_path, "test.csv", "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
     check(path, columns={"strain": 1, "stress": "Stress (MPa)"})
