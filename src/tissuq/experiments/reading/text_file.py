@@ -58,8 +58,10 @@ LINE_END = re.compile(r"(?<!\r)\r+\n")
 """Of Windows, also where a program has made it twice (``\\r\\r\\n``): no line is between."""
 RETURN_IN_LINE = re.compile(r"\r(?=[,;\t])")
 """A return that a program left at the end of a cell."""
-END_OF_BLOCK = re.compile(r"\s*<(?:END [^<>]*|divider)>\s*")
-"""A line that ends a table, as of Mach-1: ``<END DATA>``."""
+NO_ROW = re.compile(r"\s*(?:<(?:END [^<>]*|divider)>|(?=.*\|)[\s|:+]*-{2,}[-\s|:+]*)\s*")
+"""A line that ends a table, as of Mach-1 (``<END DATA>``), and one that rules it, as of Markdown (``|---|---:|``)."""
+FRAMED = re.compile(r"\s*\|(.*)\|\s*")
+"""A row between vertical bars."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
 
@@ -80,7 +82,8 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     text = LINE_END.sub("\n", without_marks(text.replace("\u2212", "-")))
     if "\n" in text:  # without one, a return ends a line
         text = RETURN_IN_LINE.sub("", text)
-    lines = ["" if END_OF_BLOCK.fullmatch(line) else line for line in text.replace("\r", "\n").split("\n")]
+    lines = ["" if NO_ROW.fullmatch(line) else line for line in text.replace("\r", "\n").split("\n")]
+    lines = [framed[1] if (framed := FRAMED.fullmatch(line)) else line for line in lines] if "|" in text else lines
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines

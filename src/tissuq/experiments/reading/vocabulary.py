@@ -48,7 +48,7 @@ OTHER_QUANTITIES = {
     "a value at failure, and no curve": r"\b(fracture|failure|rupture|break(ing)?)\b|bruch",
     "a range or a difference": r"\brange\b|difference|differenz|invariant",
     "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|\bsim\b|\bfe[am]\b|theor|berechnet",
-    "a load before the test": r"\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
+    "a load before the test": r"(?<!from )\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
     "an amplitude, and no curve": r"amplitud|амплитуд|振幅",
     "what was asked of the machine, and not measured": r"set ?point|command|demand|sollwert",
     "a multiple by a power of ten, which belongs into its unit, as in (10^-3 MPa)": r"((?<!\w)x|[×*·/]) ?"
