@@ -60,7 +60,7 @@ RETURN_IN_LINE = re.compile(r"\r(?=[,;\t])")
 """A return that a program left at the end of a cell."""
 NO_ROW = re.compile(r"\s*(?:<(?:END [^<>]*|divider)>|(?=.*\|)[\s|:+]*-{2,}[-\s|:+]*)\s*")
 """A line that ends a table, as of Mach-1 (``<END DATA>``), and one that rules it, as of Markdown (``|---|---:|``)."""
-FRAMED = re.compile(r"\s*\|(.*)\|\s*")
+FRAMED = re.compile(r"^\s*\|(.*)\|\s*$")
 """A row between vertical bars."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
@@ -82,8 +82,9 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     text = LINE_END.sub("\n", without_marks(text.replace("\u2212", "-")))
     if "\n" in text:  # without one, a return ends a line
         text = RETURN_IN_LINE.sub("", text)
-    lines = ["" if NO_ROW.fullmatch(line) else line for line in text.replace("\r", "\n").split("\n")]
-    lines = [framed[1] if (framed := FRAMED.fullmatch(line)) else line for line in lines] if "|" in text else lines
+    lines = text.replace("\r", "\n").split("\n")
+    if "|" in text or "<" in text:
+        lines = ["" if NO_ROW.fullmatch(line) else FRAMED.sub(r"\1", line) for line in lines]
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines
