@@ -230,3 +230,15 @@ def test_until_peak_goes_with_a_cycle_and_a_preload(inspected):
     assert experiment.stretch.min() >= 1.0
     assert experiment.stress.argmax() == len(experiment) - 1
     assert experiment.stress.min() >= 0.001
+
+
+def test_a_stress_that_rests_while_the_specimen_deforms_is_in_doubt(tmp_path):
+    path = tmp_path / "creep.csv"
+    rows = [f"{10 + np.log1p(t):.4f},{5 + 0.01 * np.sin(t):.4f}" for t in range(40)]
+    path.write_text("\n".join(["Strain (%),Stress (kPa)", *rows]))
+    text = " ".join(str(tq.inspect(path)).split())
+    assert (
+        "the stress stays between 4.99 and 5.01 kPa while the stretch goes from 1.1 to 1.137: the specimen creeps"
+        in text
+    )
+    assert "creeps" not in str(tq.inspect(datasets.path("rubber-treloar-uniaxial")))

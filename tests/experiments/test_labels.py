@@ -94,3 +94,37 @@ def test_they_may_be_said_of_what_is_measured():
     data = tq.Experiment("uniaxial", [1.0, 1.1], [0.0, 0.2], direction="radial", condition="wet")
     assert (data.direction, data.condition) == ("radial", "wet")
     assert data.labelled(direction="axial").direction == "axial"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Specimen: A12",
+        "# Sample ID = A12",
+        "Date: 2.3.2024; 10:15\nProbe;A12",
+        '"Specimen label","A12",',
+        "Operator: NN\tSpecimen No.: A12",
+    ],
+)
+def test_a_line_above_the_table_names_the_specimen_as_a_column_does(tmp_path, line):
+    separator = ";" if ";A12" in line else "\t" if "\t" in line else ","
+    lines = [row.replace(",", separator) for row in ["stretch,stress [kPa]", *rows(1)]]
+    above = written(tmp_path / "above.csv", line, *lines)
+    column = written(tmp_path / "column.csv", "stretch,stress [kPa],Specimen", *rows(1, "A12"))
+    assert [tq.read(file).specimen for file in (above, column)] == ["A12", "A12"]
+    assert "specimen A12" in str(tq.inspect(above))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Specimen: 1",  # which every file of a machine may say
+        "Sample: porcine liver",
+        "Specimens: A1-A6",
+        "Specimen,L0",
+        "Specimen: A1; Specimen: A2",
+        "Specimen,A1,,A2",
+    ],
+)
+def test_numbers_materials_and_several_specimens_name_none(tmp_path, line):
+    assert tq.read(written(tmp_path / "above.csv", line, "stretch,stress [kPa]", *rows(1))).specimen == ""

@@ -133,3 +133,15 @@ def test_units_in_russian_and_chinese_are_those_in_latin_letters():
     assert TORQUE.factor("Н·м") == TORQUE.factor("Nm")
     assert strain_factor("мм/мм") == 1
     assert not any(map(looks_like_unit, ("Сила", "Образец", "位移")))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "name"),
+    [("gb18030", "力"), ("gb18030", "负荷"), ("big5", "力"), ("cp932", "力"), ("koi8-r", "сила"), ("cp1250", "Siła")],
+)
+def test_one_short_name_tells_the_encoding(tmp_path, encoding, name):
+    data = tq.read(
+        written(tmp_path, encoding, [], f"Strain;{name} (N)", STRETCH - 1, 10 * STRESS), dimensions={"area": "10 mm2"}
+    )
+    np.testing.assert_allclose(data.stress, STRESS, atol=1e-6)
+    assert f"column '{name} (N)'" in data.source

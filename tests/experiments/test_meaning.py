@@ -223,6 +223,27 @@ def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_read
     check(path, "planar", mode="planar", columns={"stretch": 1})
 
 
+@pytest.mark.parametrize(
+    ("names", "count"),
+    [
+        ("Strain,Force (N),Stress (MPa),Strain,Force (N),Stress (MPa)", 2),
+        ("Strain A,Force A (N),Stress A (MPa),Strain B,Force B (N),Stress B (MPa)", 1),
+    ],
+)
+def test_a_force_over_1_mm2_is_asked_about_of_tests_side_by_side_too(tmp_path, names, count):
+    path = written(tmp_path, "export.csv", names, L - 1, N, N, L - 1, 2 * N, 2 * N)
+    strain, force, stress = names.split(",")[:3]
+    advice = (
+        f'--column strain="{strain}" --column force="{force}", and the --area .*{strain}" --column stress="{stress}"'
+    )
+    with pytest.raises(InputError, match=advice.replace("(", r"\(").replace(")", r"\)")):
+        tq.read_tests(path)
+    tests = tq.read_tests(path, columns={"strain": strain, "force": force}, area="4 mm2")
+    assert len(tests) == count
+    for number, test in enumerate(tests, 1):
+        np.testing.assert_allclose(test.stress, 1e-3 * number * P, rtol=1e-5, atol=1e-9)
+
+
 def test_an_area_of_1_mm2_that_is_meant_is_read_as_stated(tmp_path):
     path = written(tmp_path, "test.csv", "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
     check(path, columns={"strain": 1, "stress": "Stress (MPa)"})
@@ -294,3 +315,40 @@ def test_a_name_that_stands_twice_is_asked_about_in_its_role(tmp_path):
     path = written(tmp_path, "test.csv", "Strain (%),Strain (%),Stress (kPa)", 100 * (L - 1), 50 * (L - 1), P)
     with pytest.raises(InputError, match=r"several columns may be the strain: .* --column strain=NAME"):
         tq.read(path, columns={"strain": "Strain (%)"})
+
+
+SHEET = {"length": "10 mm", "width": "20 mm", "thickness": "2 mm"}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "lambda_x,lambda_y,Fx (N),Fy (N)",
+        "lambda_y,F_y (N),lambda_x,F_x (N)",
+        "lambda1,lambda2,F1 (N),F2 (N)",
+        "stretch_1,stretch_2,force_1 (N),force_2 (N)",
+    ],
+)
+def test_two_stretches_and_two_forces_are_of_both_axes_of_a_sheet_whose_sizes_are_given(tmp_path, names):
+    across = 1 + (L - 1) / 2
+    values = {"x": (L, 0.04 * P), "y": (across, 0.01 * P)}  # N of kPa on 20 mm x 2 mm, and half of them on 10 mm x 2 mm
+    columns = []
+    for name in names.replace("1", "x").replace("2", "y").split(","):
+        axis = name.removesuffix(" (N)")[-1]
+        columns.append(values[axis]["N" in name])
+    path = written(tmp_path, "sheet.csv", names, *columns)
+    check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1), dimensions=SHEET)
+
+
+@pytest.mark.parametrize(
+    ("names", "options"),
+    [
+        ("stretch_1,force_1 (N),stretch_2,force_2 (N)", {"dimensions": SHEET}),  # of two specimens, one after another
+        ("stretch_1,stretch_2,force_1 (N),force_2 (N)", {"area": "2 mm2"}),
+        ("displacement_1 (mm),displacement_2 (mm),force_1 (N),force_2 (N)", {"dimensions": SHEET}),
+    ],
+)
+def test_numbers_that_may_be_those_of_specimens_are_asked_about(tmp_path, names, options):
+    path = written(tmp_path, "sheet.csv", names, L, L, P, P)
+    with pytest.raises(InputError, match=r"mode='biaxial'.* If numbers in the names are of two specimens"):
+        tq.read(path, **options)

@@ -586,3 +586,11 @@ def test_the_name_of_a_machine_or_of_its_settings_is_no_loading_mode(tmp_path, l
     (tmp_path / "test.txt").write_text(f"Test data\n{line}\n\nStrain,Stress (kPa)\n{rows}")
     (test,) = find_tests_in_file(tmp_path / "test.txt")
     assert (test.options["mode"], test.reading.mode_source) == ("uniaxial", "nothing says otherwise")
+
+
+def test_tables_under_the_same_title_are_numbered(tmp_path):
+    rows = [f"{x - 1:.4f}\t{1e3 * neo_hookean(x):.6f}" for x in np.linspace(1, 1.3, 20)]
+    block = "\n".join(["<DATA>", "Strain\tStress (kPa)", *rows, "<END DATA>"])
+    path = tmp_path / "mach.txt"
+    path.write_text(f"<Mach-1 File>\n{block}\n{block}\n")
+    assert [test.name for test in read_tests(path)] == ["<DATA> 1", "<DATA> 2"]

@@ -134,6 +134,17 @@ def test_a_fit_of_two_stresses_predicts_strips_by_the_lateral_stretch_of_every_d
     np.testing.assert_allclose(noisy["high"] - noisy["low"], 2 * 1.96 * np.hypot(spread, 2e-3), rtol=0.05)
 
 
+def test_a_fit_and_a_prediction_refuse_a_further_energy_in_the_same_words(strips, sheet):
+    fitted = tq.fit(sheet, material=LAW, discrepancy="yeoh", noise_sd=2e-3)
+    with pytest.raises(tq.ModelError) as of_prediction:
+        fitted.predict([1.2], mode="uniaxial")
+    with pytest.raises(tq.ModelError) as of_fit:
+        tq.fit(strips, material=LAW, discrepancy="yeoh")
+    messages = [str(refusal.value).split("the lateral stretch") for refusal in (of_prediction, of_fit)]
+    assert messages[0][1] == messages[1][1]
+    assert messages[0][0] == "in mode 'uniaxial' "
+
+
 def test_the_slopes_of_a_predicted_strip_are_those_of_its_draws(sheet):
     """By which slack and errors of the length add to the band of a new test."""
     posterior = tq.fit(sheet, material=LAW, discrepancy="none", noise_sd=2e-3)

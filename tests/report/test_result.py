@@ -208,6 +208,12 @@ def test_the_terminal_says_the_answer_first_and_counts_the_rest(tmp_path, capsys
     assert out.endswith(f"Report: {tmp_path / 'report.html'}\n")
 
 
+def test_the_terminal_says_beneath_the_title_what_was_measured(capsys):
+    record = result_of().record()
+    print_result(record)
+    assert capsys.readouterr().out.splitlines()[1:3] == [record["title"], f"  {record['subject']}"]
+
+
 def test_the_terminal_calls_a_note_a_note(capsys):
     print_result(result_of(warnings=warnings_of(Severity.CAUTION, Severity.NOTE)).record())
     out = capsys.readouterr().out
@@ -225,7 +231,7 @@ def test_long_numbers_are_wrapped_in_the_terminal(capsys):
 
 def test_an_interval_is_in_one_line_in_the_terminal(capsys):
     print_result(result_of(numbers=(Number("the modulus " * 4, 6.1e-05, 2.3e-05, 1.1e-04, "MPa"),)).record())
-    assert [line.strip() for line in capsys.readouterr().out.splitlines()][3] == "95 % interval 0.000023 to 0.000110"
+    assert [line.strip() for line in capsys.readouterr().out.splitlines()][4] == "95 % interval 0.000023 to 0.000110"
 
 
 def test_no_word_is_cut_beside_a_long_name_in_the_terminal(capsys):

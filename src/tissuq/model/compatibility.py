@@ -17,7 +17,7 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
 from tissuq.model.tolerances import Tolerances
 
-__all__ = ["check_angles", "check_linearity", "check_parts", "check_separable"]
+__all__ = ["check_angles", "check_lateral_stretch", "check_linearity", "check_parts", "check_separable"]
 
 
 ANGLES = (0.0, np.pi / 2)
@@ -50,17 +50,23 @@ def _check_modes(material: Material, discrepancy: Discrepancy, experiment: Exper
     for curve in experiment.curves:
         if problem := material.why_not(curve.path.moved(curve.points[:1], 0.0)):
             raise ModelError(problem)
-        if is_lateral_stretch_open(material, discrepancy, curve.path.at(curve.points[:1])):
-            raise ModelError(
-                f"in test '{curve.name}' ({curve.mode.name}) the lateral stretch of '{material.name}' would depend on "
-                f"the discrepancy '{discrepancy.name}', too, which is an energy: choose one that is an error of the "
-                "measured stress (--discrepancy gp-pinned), or --discrepancy none."
-            )
+        where = f"test '{curve.name}' ({curve.mode.name})"
+        check_lateral_stretch(material, discrepancy, curve.path.at(curve.points[:1]), where)
 
 
-def is_lateral_stretch_open(material: Material, discrepancy: Discrepancy, states: States) -> bool:
-    """Return whether a lateral stretch that a test leaves to the material would depend on a further energy, too."""
-    return discrepancy.is_energy and bool(discrepancy.parameters) and has_free_axis(material, states)
+def check_lateral_stretch(material: Material, discrepancy: Discrepancy, states: States, where: str) -> None:
+    """Refuse a lateral stretch that is left to the material where it would depend on a further energy, too.
+
+    Raises
+    ------
+    ModelError
+    """
+    if discrepancy.is_energy and discrepancy.parameters and has_free_axis(material, states):
+        raise ModelError(
+            f"in {where} the lateral stretch of '{material.name}' would depend on the discrepancy "
+            f"'{discrepancy.name}', too, which is an energy: fit with --discrepancy none, or with one that is an error "
+            "of the stress as measured, and of its loading mode alone (--discrepancy gp-pinned)."
+        )
 
 
 def _check_parameters(material: Material, discrepancy: Discrepancy) -> None:

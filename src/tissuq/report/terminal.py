@@ -98,6 +98,7 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     shown, folded = (shown + folded, []) if details else (shown, folded)
     print_warnings([warning["text"] for warning in shown if warning["severity"] == Severity.PROBLEM])
     print(f"\n{record['title']}")
+    print(wrapped(record["subject"], TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
     _print_numbers(record["numbers"])
     if record["finding"]:
         print(wrapped(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))

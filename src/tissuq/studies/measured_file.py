@@ -204,6 +204,22 @@ class FittedSettings(Settings):
             value, "the file's stress unit", "; noise of zero would make every measurement exact"
         )
 
+    @field_validator("noise", mode="before")
+    @classmethod
+    def _is_no_size(cls, value: Any) -> Any:
+        from tissuq.experiments.numbers import number_and_unit
+
+        number, unit = number_and_unit(str(value))
+        if unit == "%":
+            raise ValueError("noise that grows with the stress is 'proportional', and how much is estimated")
+        if number is not None:
+            raise ValueError(
+                f"says how the noise behaves, not how large it is: {value} is a standard deviation, which is given as "
+                f"a number in the file's stress unit, such as --noise-sd {number:g} (noise_sd = {number:g} in a "
+                "configuration)"
+            )
+        return value
+
     _known_estimand = field_validator("estimand")(there_is("tissuq.model.tolerances:Tolerances"))
 
     @model_validator(mode="after")

@@ -69,7 +69,7 @@ def sd_or_unknown(text: str) -> float | str | dict[str, float | str]:
         return once_each("--noise-sd", ((name.strip(), number_or_text(value.strip())) for name, _, value in pairs))
     value = number_or_text(text)
     if isinstance(value, str) and value != "unknown":
-        raise InputError(f"--noise-sd must be a number or unknown, not '{text}'.")
+        raise InputError(f"--noise-sd must be a number or unknown, not '{text}'.{_without_unit(text)}")
     return value
 
 
@@ -81,9 +81,19 @@ def noises(text: str) -> list[float | str]:
         return [float(number) for number in text.split(",")]
     except ValueError as error:
         raise InputError(
-            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'. For several files, one "
-            "for each with commas."
+            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.{_without_unit(text)} "
+            "For several files, one for each with commas."
         ) from error
+
+
+def _without_unit(text: str) -> str:
+    """Return how a number with a unit is typed where the unit is that of the file; nothing for other texts."""
+    from tissuq.experiments.numbers import number_and_unit
+
+    number, unit = number_and_unit(text)
+    if unit == "%":
+        return " Noise that grows with the stress is --noise proportional, and how much is estimated."
+    return f" If the file's stresses are in {unit}, type --noise-sd {number:g}." if unit else ""
 
 
 def share(option: str) -> Callable[[str], float]:

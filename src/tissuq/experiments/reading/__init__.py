@@ -3,6 +3,7 @@
 from tissuq.experiments.reading.data_frame import ParquetFile
 from tissuq.experiments.reading.file_format import FileFormat
 from tissuq.experiments.reading.html import Html
+from tissuq.experiments.reading.json_file import JsonFile
 from tissuq.experiments.reading.matlab import MatlabFile
 from tissuq.experiments.reading.workbooks import BinaryWorkbook, OldWorkbook, OpenDocument, Workbook
 
@@ -10,6 +11,7 @@ __all__ = [
     "BinaryWorkbook",
     "FileFormat",
     "Html",
+    "JsonFile",
     "MatlabFile",
     "OldWorkbook",
     "OpenDocument",

@@ -24,7 +24,15 @@ from tissuq.experiments.reading.layout import FEWEST_ROWS, MISSING, WHITESPACE, 
 from tissuq.experiments.reading.table import Lines, Table, filled_on, padded
 from tissuq.experiments.units import looks_like_unit, measured_in
 
-__all__ = ["blocks_of", "joined_where_they_go_on", "names_above", "title_of", "transposed_table", "with_names_above"]
+__all__ = [
+    "blocks_of",
+    "joined_where_they_go_on",
+    "names_above",
+    "names_said_otherwise",
+    "title_of",
+    "transposed_table",
+    "with_names_above",
+]
 
 SAME, FAR = 0.1, 0.5
 """Share of the range of a column within which all blocks begin, and by which one of them goes back at a blank line."""
@@ -32,6 +40,10 @@ MOST_STEPS = 2
 """Largest steps of a column by which a table goes on from the one before at most."""
 TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
 """Names of a column of times."""
+NAME_BY_NUMBER = re.compile(
+    r"\W*(?:sig|column|col|spalte)\s*(?P<number>\d+)\s*[:=\t]\s*(?P<name>\S.*?)\s*", re.IGNORECASE
+)
+"""As in ``Sig3<tab>Strain (%)`` and ``# column 2: stress``."""
 FEWEST_VALUES = 4
 """Of each column of a table that lies on its side."""
 MOST_LINES = 200
@@ -179,6 +191,26 @@ def _goes_on_evenly(first_row: str, table: Table, later: Table) -> bool:
     largest = np.delete(steps, seam - 1, axis=0).max(axis=0, initial=0)
     begins_alike = np.abs(numbers[seam + 1] - numbers[0]) <= SAME * np.ptp(numbers, axis=0)
     return bool((steps[seam - 1] <= MOST_STEPS * largest).all() and not begins_alike.all())
+
+
+def names_said_otherwise(lines_above: Sequence[str], rows: Sequence[str], separator: str, width: int) -> list[str]:
+    r"""Return the names of columns that do not stand over each of them; nothing where they are not said.
+
+    R writes none over the numbers of rows, which it quotes, and thermal analysers write a line for each column.
+
+    Examples
+    --------
+    >>> names_said_otherwise(['"strain" "stress"'], ['"1" 0 0', '"2" 0.1 5'], " ", 3)
+    ['row', 'strain', 'stress']
+    >>> names_said_otherwise(["Sig1\tStrain (%)", "Sig2\tStress (kPa)", "StartOfData"], ["0\t0", "1\t5"], "\t", 2)
+    ['Strain (%)', 'Stress (kPa)']
+    """
+    header = split(lines_above[-1], separator) if lines_above else []
+    are_numbered = [row.startswith(f'"{number}"') for number, row in enumerate(rows[:FEWEST_VALUES], 1)]
+    if len(header) == width - 1 and all(are_numbered) and not any(map(NUMBER.fullmatch, header)):
+        return ["row", *header]
+    numbered = {int(match["number"]): match["name"] for match in map(NAME_BY_NUMBER.fullmatch, lines_above) if match}
+    return [numbered[number] for number in range(1, width + 1)] if {*range(1, width + 1)} == numbered.keys() else []
 
 
 def title_of(lines_above: Sequence[str], separator: str) -> str:

@@ -20,6 +20,7 @@ from tissuq.experiments.reading.columns_of_tube import (
 from tissuq.experiments.reading.dimensions import Dimensions
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import PRESSURE, TOTAL_FORCE, ColumnChoice
+from tissuq.experiments.reading.stated_axial_stretch import LARGEST, stated_axial_stretch
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tube import SAME_STRETCH, Tube, rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
@@ -33,8 +34,6 @@ __all__ = [
     "stretches_held",
 ]
 
-LARGEST = 4.0
-"""Axial stretch beyond which a number is hardly one, but percent."""
 ROWS_AT_EACH = 3
 """Rows at each axial stretch, on average at least, where it is held."""
 NOTABLE_STRETCH = 0.1
@@ -95,9 +94,9 @@ def axial_stretch_of(
                 "inflated-tube (or thin-tube, where the axial force was measured, too), or leave it out."
             )
         return None
-    column = column_of_axial_stretch(table, options)
-    if given is not None and abs(given - 1) > SAME_STRETCH:
-        raise _not_at_its_length(table.file, given)
+    column, stated = column_of_axial_stretch(table, options), stated_axial_stretch(table, options)
+    if stated is not None and abs(stated.value - 1) > SAME_STRETCH:
+        raise _not_at_its_length(f"{table.file}{stated.place}", stated.value)
     if given is None and column is not None:
         values = _numbers(table, column)
         row = int(np.argmax(np.abs(values - 1)))
@@ -107,15 +106,15 @@ def axial_stretch_of(
 
 
 def _required(table: Table, given: float | None, dimensions: Dimensions, options: ReadingOptions) -> AxialStretch:
-    column = column_of_axial_stretch(table, options)
-    if given is None and column is None:
-        raise InputError(f"{table.file}: say at which axial stretch the tube was held, {HOW_TO_SAY_AXIAL_STRETCH}")
+    column, stated = column_of_axial_stretch(table, options), stated_axial_stretch(table, options)
     if given is not None and not 0 < given <= LARGEST:
         raise InputError(
             f"axial_stretch (--axial-stretch) must be a deformed over an undeformed length such as 1.5, not {given:g}."
         )
     if column is None:
-        return AxialStretch(np.full(len(table.rows), float(given or 1.0)), f"axial stretch {given:g} (as given)")
+        if stated is None:
+            raise InputError(f"{table.file}: say at which axial stretch the tube was held, {HOW_TO_SAY_AXIAL_STRETCH}")
+        return AxialStretch(np.full(len(table.rows), stated.value), f"axial stretch {stated.value:g} ({stated.source})")
     label = table.label(column)
     if is_of_length(table, column):
         values, source = _from_length(table, column, dimensions, options)

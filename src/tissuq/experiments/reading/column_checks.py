@@ -277,15 +277,23 @@ def check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_s
         )
 
 
-def check_section(table: Table, stress: int, load: str) -> None:
-    """Ask about stresses that are a force over exactly 1 mm2, as software states them to which nobody said the area."""
-    forces = [k for k, quantity in enumerate(table.quantities) if quantity in ROLES["force"] and table.varies(k)]
+def check_section(table: Table, stress: int, load: str, given: str = "") -> None:
+    """Ask about stresses that are a force over exactly 1 mm2, as software states them to which nobody said the area.
+
+    ``given`` are further options that read the same test.
+    """
+    are_forces = [
+        quantity in ROLES["force"] or measured_in(table.unit(k)) == "force"
+        for k, quantity in enumerate(table.quantities)
+    ]
+    forces = [k for k, is_force in enumerate(are_forces) if is_force and table.varies(k)]
     of_area_1 = [force for force in forces if load == "stress" and _is_over_1_mm2(table, stress, force)]
     if of_area_1:
         raise InputError(
             f"{table.place(stress)} is {table.label(of_area_1[0])} over 1 mm2, as the software of a machine states it "
-            f'where no cross-section was entered. Give the forces, --column force="{table.names[of_area_1[0]]}", and '
-            f'the --area of the specimen; if that is 1 mm2 all the same, --column stress="{table.names[stress]}".'
+            f"where no cross-section was entered. Give the forces,{given} --column "
+            f'force="{table.names[of_area_1[0]]}", and the --area of the specimen; if that is 1 mm2 all the same,'
+            f'{given} --column stress="{table.names[stress]}".'
         )
 
 

@@ -19,7 +19,7 @@ from tissuq.experiments.reading.column_checks import (
     with_types,
 )
 from tissuq.experiments.reading.columns_of_tube import columns_of_tube, with_columns_of_tube
-from tissuq.experiments.reading.headings import AXES, COMPONENTS, contents_of, on_axis
+from tissuq.experiments.reading.headings import contents_of, on_axis, on_axis_by_unit
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -202,7 +202,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
     names, axes = [on_axis(name) for name, _ in _names(table)], _axes_of(table)
     if len(axes) == 2:
-        names = [_on_axis_by_unit(table, column, *name) for column, name in enumerate(names)]
+        names = [name if name[0] else on_axis_by_unit(name[1], table.unit(k)) for k, name in enumerate(names)]
     if not mapping:
         names = _without_empty(table, names)
     if axis is not None and axis not in axes:
@@ -225,13 +225,6 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
         )
     wanted = axis or (axes[0] if len(axes) == 1 else "")
     return [name if axis_of_name in ("", wanted) else "" for axis_of_name, name in names]
-
-
-def _on_axis_by_unit(table: Table, column: int, axis: str, name: str) -> tuple[str, str]:
-    """Return the axis and the name of a column: where others have axes, ``P1`` with a unit of stress is along one."""
-    symbol, number = name[:1], name[1:].strip()
-    is_component = not axis and symbol in COMPONENTS["stress"] and number in AXES
-    return (AXES[number], symbol) if is_component and measured_in(table.unit(column)) == "stress" else (axis, name)
 
 
 def _without_empty(table: Table, names: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -17,6 +17,7 @@ from tissuq.experiments.reading.recognition import (
     Contents,
     find_column,
 )
+from tissuq.experiments.reading.stated_axial_stretch import stated_axial_stretch
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import (
     AXIAL_STRETCH,
@@ -69,15 +70,17 @@ def mode_of_tube(table: Table, options: ReadingOptions) -> tuple[str, str]:
     if PRESSURE not in columns and not [*_of_role(table, quantities, PRESSURE, may_be_held=True)]:
         return "", ""
     has_force = bool(columns.keys() & {*FORCES} or _forces(table, quantities))
-    has_stretch = column_of_axial_stretch(table, options) is not None
-    may_be_held = has_force and (has_stretch or options.get("axial_stretch") is not None)
+    has_column, is_stated = column_of_axial_stretch(table, options) is not None, stated_axial_stretch(table, options)
+    may_be_held = has_force and bool(has_column or is_stated)
     found = {role: [*_of_role(table, quantities, role, may_be_held=may_be_held)] for role in (PRESSURE, *DIAMETERS)}
     there = {role for role, columns_of_role in found.items() if role in columns or columns_of_role}
     if PRESSURE not in there or len(there) < 2:
         return "", ""
     if has_force:
         return ThinTube.name, "columns of pressure, diameter and force"
-    return (InflatedTube.name, "columns of pressure, diameter and axial stretch") if has_stretch else ("", "")
+    if has_column:
+        return InflatedTube.name, "columns of pressure, diameter and axial stretch"
+    return (InflatedTube.name, is_stated.source) if is_stated else ("", "")
 
 
 def columns_of_tube(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:
@@ -104,7 +107,7 @@ def columns_of_tube(table: Table, mode: LoadingMode, options: ReadingOptions) ->
     if force in (diameter, pressure):
         raise InputError(f"{table.file}: column {table.label(force)} cannot be the axial force of a tube, too.")
     axial = column_of_axial_stretch(table, options)
-    if axial is None and options.get("axial_stretch") is None:
+    if axial is None and stated_axial_stretch(table, options) is None:
         raise InputError(
             f"{table.file}: beside pressure and diameter column {table.label(force)} is the axial force of a tube, and "
             f"nothing says its axial stretch, {HOW_TO_SAY_AXIAL_STRETCH} To read the pressure alone of a tube that was "
@@ -139,7 +142,7 @@ def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None
         if (wanted := columns_given.get(role)) is not None:
             return find_column(table, role, wanted)
     columns = [column for column, quantity in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(quantity)]
-    if not columns and options.get("axial_stretch") is None:
+    if not columns and stated_axial_stretch(table, options) is None:
         is_known = "length" in (options.get("dimensions") or {})
         columns = [
             column

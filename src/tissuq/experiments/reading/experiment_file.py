@@ -146,7 +146,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         Likewise, of a tube; its axial force is ``force``, or ``total_force`` with that of the pressure on its ends.
     axial_stretch : float, optional
         Of a tube that was stretched along its axis: the length at which it is held over the undeformed one. Without it
-        the file's column of that name, or the one in ``columns`` under ``axial_stretch``, also of lengths.
+        the file's column of that name, the one in ``columns`` under ``axial_stretch``, also of lengths, or what a line
+        above the table states.
     length, area, width, thickness, diameter : str, optional
         Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
     unit : str, optional

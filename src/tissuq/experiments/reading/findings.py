@@ -43,6 +43,8 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 SAME_RATIO = np.radians(5.0)
 """Angle between the strains of two axes within which cycles have the same ratio of them."""
+SAME_LOAD = 0.02
+"""Range of the stresses over the largest below which the load of a test was held."""
 SAME_PEAK = 0.02
 """Difference of the deformations at the peaks of cycles, over the range of the test, within which these are equal."""
 MIN_CONTRACTION = 0.2
@@ -88,6 +90,20 @@ def _size(reading: Reading, number: int) -> str:
     if low <= largest <= high:
         return ""
     return f"the largest stress is {largest:.3g} MPa: check the units of force and area, or of stress."
+
+
+def _creep(reading: Reading, number: int) -> str:
+    """Return that the only stress of a test rests while the specimen deforms; nothing of others."""
+    course, stress = reading.used.course, reading.used.stress[number]
+    least, largest = np.sort(np.abs([stress.min(), stress.max()]))
+    if len(reading.used.labels) > 1 or np.ptp(course) == 0 or np.ptp(stress) >= SAME_LOAD * largest:
+        return ""
+    unit, control = reading.tested[number].unit, reading.experiment.mode.controls[0].name
+    return (
+        f"the stress stays between {least / unit.to_mpa:.4g} and {largest / unit.to_mpa:.4g} {unit.name} while the "
+        f"{control} goes from {course.min():.4g} to {course.max():.4g}: the specimen creeps under a load that is held, "
+        "as no elastic material does, and one stress tells no curve; or another column is the stress."
+    )
 
 
 def _stretch_size(reading: Reading, number: int) -> str:
@@ -379,6 +395,7 @@ CAUTION, NOTE = ("measurements", Severity.CAUTION), ("measurements", Severity.NO
 CHECKS: Mapping[Callable[[Reading, int], str], tuple[str, Severity]] = {
     _other_axis: CAUTION,
     _shear: CAUTION,
+    _creep: ("doubtful-reading", Severity.PROBLEM),
     _size: CAUTION,
     _stretch_size: CAUTION,
     _cycles: CAUTION,

@@ -336,3 +336,19 @@ def on_lettered_axis(quantity: str) -> tuple[str, str]:
     axis, name = on_axis(quantity)
     is_numbered = AXES.keys() - AXES.values() & {quantity[:1], quantity[-1:]}
     return ("", quantity) if is_numbered else (axis, name)
+
+
+def on_axis_by_unit(quantity: str, unit: str) -> tuple[str, str]:
+    """Return the axis and the name of a column whose symbol its unit makes one of a load, where others have axes.
+
+    Examples
+    --------
+    >>> on_axis_by_unit("p1", "kPa"), on_axis_by_unit("fx", "N"), on_axis_by_unit("f x", ""), on_axis_by_unit("f1", "")
+    (('x', 'p'), ('x', 'force'), ('x', 'force'), ('', 'f1'))
+    """
+    symbol, axis, kind = quantity[:1], quantity[1:].strip(), measured_in(unit)
+    if axis in AXES and symbol in COMPONENTS["stress"] and kind == "stress":
+        return AXES[axis], symbol
+    if axis in AXES and symbol == "f" and (kind == "force" or not (unit or axis.isdecimal())):
+        return AXES[axis], "force"
+    return "", quantity

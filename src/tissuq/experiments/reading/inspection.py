@@ -27,7 +27,7 @@ __all__ = ["Inspection", "inspect", "lines_of_tests", "noise_between_neighbours"
 MIN_TRIPLES = 30
 """Number of triples of neighbouring measurements from which their scatter shows the noise."""
 MAX_CYCLES_SHOWN = 12
-SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "vertical bars", " ": "blanks"}
 LABEL_WIDTH, TEXT_WIDTH = 10, 110
 """Characters of the column of labels, and of a line."""
 

@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 WHITESPACE = " "
-SEPARATORS = ("\t", ";", ",", WHITESPACE)
+SEPARATORS = ("\t", ";", ",", "|", WHITESPACE)
 SPREADSHEET_ERRORS = frozenset(
     ["#n/a", "#nv", "#ref!", "#bezug!", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#name?", "#null!", "#calc!",
      "#spill!", "#field!", "#getting_data"]
@@ -90,12 +90,23 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
         return None
     first_row = _with_faulty_rows_above(lines, cells, confirmed)
     units_row = first_row - 1
+    if _are_remarks(lines, cells, units_row, len(cells(lines[confirmed]))):
+        units_row -= 1
     has_units = units_row > 0 and is_units_row(cells(lines[units_row]), cells(lines[units_row - 1]))
     has_units = has_units and _are_names(_without_number(cells(lines[units_row - 1])))
     names_row = units_row - has_units
     width = len(cells(lines[confirmed]))
     has_names = names_row >= 0 and bool(column_names(lines[names_row], width, separator, has_units=has_units))
     return Layout(separator, first_row, width, names_row if has_names else None, units_row if has_units else None)
+
+
+def _are_remarks(lines: Sequence[str], cells: Split, row: int, width: int) -> bool:
+    """Tell whether words above the data say more of columns that have names and units above them, as of Origin."""
+    if row < 2:
+        return False
+    names, units, words = (cells(line) for line in lines[row - 2 : row + 1])
+    is_units = is_units_row(units, names) and not is_units_row(words, units)
+    return is_units and len(names) == width and _are_names(names) and not any(map(looks_like_unit, filter(None, words)))
 
 
 def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:

@@ -11,7 +11,8 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.numbers import NUMBER
-from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, is_of_specimens, plain
+from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, heading, is_of_specimens, plain
+from tissuq.experiments.reading.layout import WHITESPACE, split
 from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice, find_column
 from tissuq.experiments.reading.stated_mode import modes_in_column
 from tissuq.experiments.reading.table import Column, Table, filled_on
@@ -44,6 +45,9 @@ SPECIMENS_OF_POPULATION = 3
 """Fewest specimens that show a population."""
 SHOWN = 6
 """Number of values that a message lists."""
+
+NAME_OF_ONE = re.compile(r"(?!(?P<letters>\D*)\d+[-–](?P=letters)?\d+$)(?=.*\d)(?=.*[^\W\d_])[\w.–-]{2,30}")
+"""The name of a specimen, of letters and digits, but no range such as ``A1-A6``; words may be those of a material."""
 
 LABELS = {
     "direction": (
@@ -147,10 +151,26 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 
 
 def specimen_of(table: Table) -> str:
-    """Return the specimen that columns name, of which all rows are; an empty text where they name none, or several."""
+    """Return the specimen of all rows that columns name, or else a line above; an empty text for none, or several."""
     columns = [column for column in range(len(table.names)) if is_of_specimens(table.quantities[column])]
     labels = [_text_of_all_rows(table, column) for column in columns]
+    if not columns:
+        labels = list(dict.fromkeys(_specimens_in_lines(table)))
+        return labels[0] if len(labels) == 1 else ""
     return " ".join(labels) if all(labels) else ""
+
+
+def _specimens_in_lines(table: Table) -> Iterator[str]:
+    """Yield the names of specimens in lines above a table, such as A12; a number alone may be that of another test."""
+    for _, text in table.head:
+        cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
+        filled = [cell.strip(' "#') for cell in cells if cell.strip(' "#')]
+        statements = [re.split(r"\s*[:=]\s*", cell, maxsplit=1) for cell in filled]
+        statements = [words for words in statements if len(words) > 1 and words[1]]
+        for name, value in statements or ([filled] if len(filled) == 2 else []):
+            is_size = bool(dimensions_named(heading(value).quantity, is_cylinder=True))
+            if is_of_specimens(heading(name.rstrip(" :=")).quantity) and NAME_OF_ONE.fullmatch(value) and not is_size:
+                yield value
 
 
 def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], course: Column) -> str:

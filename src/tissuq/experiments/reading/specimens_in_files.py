@@ -32,7 +32,7 @@ __all__ = [
     "read_covariates",
 ]
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet")
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet", ".json")
 """Of files in a folder that may hold measurements."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,7 +13,16 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.experiments.reading.columns_of_tube import mode_of_tube
-from tissuq.experiments.reading.headings import NEXT_WORD, STRESS_NOUNS, heading, measure_in, on_lettered_axis
+from tissuq.experiments.reading.headings import (
+    COMPONENTS,
+    NEXT_WORD,
+    STRESS_NOUNS,
+    heading,
+    measure_in,
+    on_axis,
+    on_axis_by_unit,
+    on_lettered_axis,
+)
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import SHEARS
 from tissuq.experiments.reading.table import Table
@@ -92,6 +101,10 @@ DIRECTIONS_OF_LOAD = {
     ),
 }
 """Words for the direction of a load."""
+SIZES_OF_SHEET = frozenset({"length", "width", "thickness"})
+"""Those that forces along both of its axes need."""
+BY_KIND = ["stretch", "stretch", "load", "load"]
+"""Stretches or strains and loads of two axes, in this order; those of two specimens are one test after another."""
 HEAD_LINES = 20
 """Lines of a file in which a comment may state its mode."""
 
@@ -156,7 +169,7 @@ def mode_of(
     if not mode and (options.get("axial_stretch") is not None or ROLE_OF_AXIAL_STRETCH in columns):
         mode, source = "inflated-tube", "an axial stretch"
     if not (mode or columns or options.get("axis")):
-        mode, source = _mode_of_columns(table)
+        mode, source = _mode_of_columns(table, options.get("dimensions") or {})
     if not mode:
         _check_abbreviations(table, Path(file).stem, table.sheet)
     return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
@@ -263,13 +276,23 @@ def about_mode(mode: str, source: str) -> Iterator[None]:
         ) from error
 
 
-def _mode_of_columns(table: Table) -> tuple[str, str]:
-    """Return the mode that the columns of a table leave no choice about, and why; empty texts where they do."""
+def _mode_of_columns(table: Table, sizes: Collection[str]) -> tuple[str, str]:
+    """Return the mode that the columns of a table leave no choice about, and why; empty texts where they do.
+
+    Numbers may be those of specimens; with the sizes of a sheet along both axes given, two of each are of axes.
+    """
     quantities = [measure_in(quantity)[0] for quantity in table.quantities]
     deformations = ROLES["stretch"] | ROLES["strain"] | ROLES["displacement"]
-    on_axes = [on_lettered_axis(quantity) for quantity in quantities]
-    loads = ROLES["stress"] | STRESS_NOUNS | ROLES["force"]
-    if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
+    loads = ROLES["stress"] | STRESS_NOUNS | COMPONENTS["stress"] | ROLES["force"]
+    is_of_sheet = SIZES_OF_SHEET.issubset(sizes)
+    on_axes = [(on_axis if is_of_sheet else on_lettered_axis)(quantity) for quantity in quantities]
+    if any(axis and name in deformations for axis, name in on_axes):
+        on_axes = [one if one[0] else on_axis_by_unit(one[1], table.unit(k)) for k, one in enumerate(on_axes)]
+    kinds = ["load" if name in loads else name for _, name in on_axes if name in deformations | loads]
+    kinds = ["stretch" if name in ROLES["stretch"] | ROLES["strain"] else name for name in kinds]
+    are_numbered = not any(on_lettered_axis(quantity)[0] for quantity in quantities)
+    has_both = all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads))
+    if has_both and (kinds == BY_KIND or not are_numbered):
         return "biaxial", "columns of both axes"
     stretches, shears, twists = (
         names & set(quantities) for names in (deformations, ROLES["shear"] | ROLES["sliding"], ROLES["twist"])

@@ -19,6 +19,7 @@ from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.arrangement import (
     blocks_of,
     joined_where_they_go_on,
+    names_said_otherwise,
     title_of,
     transposed_table,
     with_names_above,
@@ -247,7 +248,9 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         header_line, header = _comment_above(filled, first_line)
     else:
         header_line, header = content[layout.names]
-    names = column_names(header, layout.width, layout.separator, has_units=layout.units is not None)
+    above = [text for line, text in filled if line < first_line]
+    names = names_said_otherwise(above, texts[layout.first_row :], layout.separator, layout.width)
+    names = names or column_names(header, layout.width, layout.separator, has_units=layout.units is not None)
     width = len(names) or layout.width
     if width > MOST_COLUMNS:
         raise InputError(

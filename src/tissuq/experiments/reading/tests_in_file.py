@@ -16,7 +16,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.reading.column_checks import check_machine
+from tissuq.experiments.reading.column_checks import check_machine, check_section
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
@@ -177,7 +177,9 @@ def find_tests_in_file(
             names.append(table.sheet)
         if table.number:
             selection["table"] = table.number
-            names.append(table.title or str(table.number))
+            titles = [other.title for other in tables if other.sheet == table.sheet]
+            is_alone = titles.count(table.title) == 1
+            names.append(table.title if is_alone else f"{table.title} {table.number}".strip())
         try:
             rows = only_rows(table, columns_only(table, options.get("only")))
             of_table = _side_by_side(rows, path, selection, names)
@@ -234,6 +236,10 @@ def _side_by_side(
         (measure, deformation), (load, stress) = tests[0].columns.items()
         given = f' --column {load}="{table.names[int(stress) - 1]}"'
         check_machine(table, table.quantities, int(deformation) - 1, measure, given)
+        for test in tests:
+            (measure, deformation), (load, stress) = test.columns.items()
+            given = f' --column {measure}="{table.names[int(deformation) - 1]}"'
+            check_section(table, int(stress) - 1, load, given)
     return list(tests)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import without_marks
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES
 
 __all__ = ["DATA_SETS", "read_lines"]
 
@@ -46,6 +47,11 @@ Of those that fit alike the first one is taken: Chinese texts hardly keep to the
 """
 SHARE_OF_WORDS = 0.25
 """Usual characters in such words over those beyond ASCII, at least."""
+WESTERN = "cp1252"
+"""The encoding where nothing speaks for another one."""
+NAMES = frozenset().union(*ROLES.values(), *DIMENSION_NAMES.values())
+"""Of columns and sizes: whichever encoding makes most of them is taken before shares of words."""
+BETWEEN_NAMES = re.compile(r"""[,;:=|"()\[\]/\s]+""")
 LINES_FOR_ENCODING = 200
 """Lines with bytes beyond ASCII that show an encoding."""
 FORTRAN_EXPONENT = re.compile(r"(\d\.\d*|\.\d+)[dD]([+-]\d{2,3})\b")
@@ -54,6 +60,10 @@ LINE_END = re.compile(r"(?<!\r)\r+\n")
 """Of Windows, also where a program has made it twice (``\\r\\r\\n``): no line is between."""
 RETURN_IN_LINE = re.compile(r"\r(?=[,;\t])")
 """A return that a program left at the end of a cell."""
+NO_ROW = re.compile(r"\s*(?:<(?:END [^<>]*|divider)>|(?=.*\|)[\s|:+]*-{2,}[-\s|:+]*)\s*")
+"""A line that ends a table, as of Mach-1 (``<END DATA>``), and one that rules it, as of Markdown (``|---|---:|``)."""
+FRAMED = re.compile(r"^\s*\|(.*)\|\s*$")
+"""A row between vertical bars."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
 
@@ -75,6 +85,8 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     if "\n" in text:  # without one, a return ends a line
         text = RETURN_IN_LINE.sub("", text)
     lines = text.replace("\r", "\n").split("\n")
+    if "|" in text or "<" in text:
+        lines = ["" if NO_ROW.fullmatch(line) else FRAMED.sub(r"\1", line) for line in lines]
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines
@@ -129,9 +141,19 @@ def _encodings(content: bytes) -> list[str]:
         return ["utf-16-be" if content[0] == 0 else "utf-16-le"]
     lines = [line for line in content.splitlines() if not line.isascii()]
     sample = b"\n".join(lines[:LINES_FOR_ENCODING])
-    shares = {encoding: _share_of_words(sample, encoding) for encoding in LANGUAGES}
-    likely = max(shares, key=lambda encoding: shares[encoding])
-    return ["utf-8", *([likely] if shares[likely] > SHARE_OF_WORDS else []), "cp1252", "latin-1"]
+    shares = {WESTERN: SHARE_OF_WORDS} | {encoding: _share_of_words(sample, encoding) for encoding in LANGUAGES}
+    names = {encoding: _names_of_columns(sample, encoding) for encoding in shares}
+    likely = max(shares, key=lambda encoding: (names[encoding], shares[encoding]))
+    return ["utf-8", likely, WESTERN, "latin-1"]
+
+
+def _names_of_columns(content: bytes, encoding: str) -> int:
+    """Return how many known names of columns and sizes with letters beyond ASCII a text has; they may be very short."""
+    try:
+        text = content.decode(encoding)
+    except UnicodeDecodeError:
+        return 0
+    return sum(not word.isascii() and word.strip().lower() in NAMES for word in BETWEEN_NAMES.split(text))
 
 
 def _share_of_words(content: bytes, encoding: str) -> float:

@@ -8,6 +8,7 @@ from unicodedata import normalize
 from tissuq.experiments.units import measured_in
 
 __all__ = [
+    "AXIAL_STRAIN",
     "AXIAL_STRETCH",
     "COUNT_NAMES",
     "CYCLE_NAMES",
@@ -47,7 +48,7 @@ OTHER_QUANTITIES = {
     "a value at failure, and no curve": r"\b(fracture|failure|rupture|break(ing)?)\b|bruch",
     "a range or a difference": r"\brange\b|difference|differenz|invariant",
     "what a model says": r"predict|^model|\bmodel(led)?$|^fit$|\bfit(ted)?$|simulat|\bsim\b|\bfe[am]\b|theor|berechnet",
-    "a load before the test": r"\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
+    "a load before the test": r"(?<!from )\bpre ?(load|stress|strain|tension|stretch)|^vorkraft|^vorspannung",
     "an amplitude, and no curve": r"amplitud|амплитуд|振幅",
     "what was asked of the machine, and not measured": r"set ?point|command|demand|sollwert",
     "a multiple by a power of ten, which belongs into its unit, as in (10^-3 MPa)": r"((?<!\w)x|[×*·/]) ?"
@@ -216,11 +217,16 @@ ROLE_OF_AXIAL_STRETCH = "axial_stretch"
 
 
 AXIAL_STRETCH = re.compile(
-    r"(axial|longitudinal|z) (stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?(z|axial)|in ?vivo stretch|"
+    r"(axial|longitudinal|z) (pre ?)?(stretch( ratio)?|lambda|λ)|(stretch|lambda|λ) ?(z|axial)|pre ?stretch( ratio)?|"
+    r"(in ?vivo) (axial |longitudinal )?stretch( ratio)?|"
     r"(axiale|longitudinale) (dehnung|streckung)|[ée]tirement (axial|longitudinal)|estiramiento (axial|longitudinal)|"
     r"轴向拉伸比?|осевая степень растяжения"
 )
 """Names of a column that is one where there are columns of a tube, too."""
+
+
+AXIAL_STRAIN = re.compile(r"(axial|longitudinal) (pre ?)?strain")
+"""Likewise, of a strain, where a line states it."""
 
 
 LENGTH_OF_TUBE = re.compile(
