@@ -56,6 +56,17 @@ def test_a_material_that_is_allowed_to_be_wrong_serves_where_one_mode_was_measur
     assert posterior.answer.next_step.shell.endswith("tissuq design {run} says which helps most.")
 
 
+def test_a_sheet_that_was_strained_in_one_proportion_alone_is_judged_as_one_mode_is():
+    strip = tq.simulate("yeoh", YEOH, STRETCH, noise_sd=0.01, mode="constrained-uniaxial", seed=1)
+    sheet = tq.Experiment("biaxial", np.column_stack([STRETCH, np.ones_like(STRETCH)]), strip.stress)
+    as_strip, as_sheet = (gallery.fit(data, material="yeoh", noise_sd=0.01) for data in (strip, sheet))
+    assert verdicts(as_strip) == verdicts(as_sheet)
+    assert as_sheet.answer.uses[2].reason.endswith("of both axes were measured in one proportion alone")
+    both = np.column_stack([STRETCH, STRETCH[::-1]])
+    several = gallery.fit(tq.simulate("yeoh", YEOH, both, 0.01, mode="biaxial", seed=1), material="yeoh", noise_sd=0.01)
+    assert "proportion" not in several.answer.uses[2].reason
+
+
 def test_a_wrong_material_without_discrepancy_serves_for_nothing_but_its_own_test_and_auto_is_next():
     posterior = yeoh(discrepancy="none")
     assert "unmodelled-curve" in {warning.code for warning in posterior.warnings}

@@ -55,3 +55,12 @@ def test_few_measurements_stay_as_they_are_and_short_curves_beside_long_ones():
     both = tq.Experiment.of([short, long]).averaged(2_000)
     assert [len(curve) for curve in both.curves] == [100, 900]
     assert (both.rows_name, short.rows_name) == ("means of up to 5 measurements", "measurements")
+
+
+def test_means_are_joined_with_means_of_as_many_measurements_alone():
+    long, more = (tq.simulate("neo-hookean", {"C10": 0.5}, UP[::step], 0.05, seed=step) for step in (3, 30))
+    of_means = tq.fit(long, discrepancy="none", noise_sd=0.05, tolerances=tq.Tolerances(stress=0.1))
+    with pytest.raises(tq.InputError, match=r"\(measurements\) cannot be added .*\(means of 2 measurements\)"):
+        of_means.update(more)
+    as_many = tq.simulate("neo-hookean", {"C10": 0.5}, UP[::3], 0.05, seed=2).averaged(2000)
+    assert of_means.update(as_many).model.experiment.rows_name == "means of 2 measurements"

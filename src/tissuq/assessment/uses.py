@@ -14,6 +14,7 @@ from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
 from tissuq.experiments.curve import Curve
+from tissuq.experiments.experiment import Experiment
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Solution
 from tissuq.model.tolerances import AS_TESTED, TISSUE
@@ -53,6 +54,8 @@ NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 SPREAD = "assumed spread between specimens"
 SKEW = 1.25
 """Ratio of the parts of an interval above and below the mean up to which one number stands for both."""
+MAX_ASIDE = 0.05
+"""Distance of measured strains from one proportion, over the largest strain, up to which they are in it."""
 GRID_POINTS = 9
 """Stretches at which the width of a band is looked at."""
 
@@ -265,10 +268,23 @@ def _other_modes(
     sentence = f"within the strains that were {origin}: {of_modes}"
     if {"tests-apart", "contradicting-tests"} & {*codes}:
         return worst_of(verdict, Verdict.CARE), f"{sentence}; but the tests contradict each other"
-    is_one_path = len(measured) == 1 and len(model.experiment.modes[0].controls) == 1
-    if solution.is_of_data and is_one_path:
-        return worst_of(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
+    if solution.is_of_data and (path := _only_path(model.experiment)):
+        return worst_of(verdict, Verdict.CARE), f"{sentence}; {path}"
     return verdict, sentence
+
+
+def _only_path(experiment: Experiment) -> str:
+    """Return in words that all was measured along one path from rest, and its opposite; empty where it was not."""
+    if len(experiment.modes) > 1:
+        return ""
+    if len(experiment.modes[0].controls) == 1:
+        return "only one mode was measured"
+    strain = experiment.states.log_stretches[0]
+    size = np.linalg.norm(strain, axis=1)
+    farthest = strain[size.argmax()]
+    aside = strain - np.outer(strain @ farthest, farthest) / size.max() ** 2
+    is_path = np.linalg.norm(aside, axis=1).max() <= MAX_ASIDE * size.max()
+    return "the strains of both axes were measured in one proportion alone" if is_path else ""
 
 
 def _compression_and_tension(stable_range: StableRange) -> list[FloatArray]:

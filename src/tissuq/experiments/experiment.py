@@ -383,7 +383,7 @@ class Experiment:
         Raises
         ------
         InputError
-            When the loading modes differ, or there are several tests.
+            When the loading modes differ, or there are several tests, or rows are means of more measurements in one.
         """
         if len(self.tests) > 1:
             raise InputError(
@@ -394,6 +394,12 @@ class Experiment:
                 f"experiment '{experiment.name}' is {experiment.mode.name} and experiment '{self.name}' "
                 f"{self.mode.name}: only measurements in the same loading mode can be added."
             )
+        averaged = self.curves[0].averaged
+        if experiment.curves[0].averaged != averaged:
+            raise InputError(
+                f"experiment '{experiment.name}' ({experiment.rows_name}) cannot be added to '{self.name}' "
+                f"({self.rows_name}): means are less uncertain than single measurements. Fit all together again."
+            )
         columns = [
             (test.stretch, test.stress, test.standard_error.reshape(test.stress.T.shape).T)
             for test in (self, experiment)
@@ -401,4 +407,4 @@ class Experiment:
         stretch, stress, error = map(np.concatenate, zip(*columns, strict=True))
         labels = {name: getattr(self, name) for name in ("name", "source", "specimen", "direction", "condition")}
         joined = Experiment(self.mode, stretch, stress, standard_error=error, least_errors=self.least_errors)
-        return joined.labelled(stress_unit=self.stress_unit, **labels)
+        return joined.labelled(stress_unit=self.stress_unit, averaged=averaged, **labels)

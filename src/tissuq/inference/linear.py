@@ -210,16 +210,20 @@ def condition(
         Number of measurements.
     """
     p = fit.inverse.shape[-1]
-    mean, weight, constant = prior
-    offset = mean - fit.centre
-    precision = moments[..., :p, :p] + fit.inverse.mT @ (weight[..., None] * fit.inverse)
-    pull = moments[..., :p, p:] @ multipliers[..., None] + fit.inverse.mT @ (weight * offset)[..., None]
+    centre, precision, constant = prior
+    pull = moments[..., :p, p:] @ multipliers[..., None]
     size = (multipliers[..., None, :] @ moments[..., p:, p:] @ multipliers[..., None])[..., 0]
-    gaussian = integrated(precision, pull, size + (weight * offset**2).sum(axis=-1)[..., None])
+    gaussian = integrated(moments[..., :p, :p], pull, size)
+    root = fit.inverse @ gaussian.root
+    mean = fit.centre + (root @ gaussian.scores)[..., 0]
     exponent = gaussian.misfit[..., 0] + log_determinant + (count - p) * log(2 * pi)
     log_likelihood = constant + gaussian.log_volume - fit.log_size - 0.5 * exponent
-    root = fit.inverse @ gaussian.root
-    return Conditional(log_likelihood, fit.centre + (root @ gaussian.scores)[..., 0], root)
+    for index in range(p):
+        if isinstance(precision, np.ndarray) and not precision[..., index].any():
+            continue
+        mean, root, log_mass = _times_gaussian(mean, root, index, centre[..., index], precision[..., index])
+        log_likelihood = log_likelihood + log_mass
+    return Conditional(log_likelihood, mean, root)
 
 
 class ConditionalGaussian:
@@ -358,12 +362,21 @@ def times_gaussians(
         centre, precision, log_height = prior.gaussian or (0.0, 0.0, 0.0)
         if not precision:
             continue
-        along = root[:, index]
-        variance = (along**2).sum(axis=1) + 1 / precision
-        miss = centre - mean[:, index]
-        covariance = np.einsum("mij,mj->mi", root, along)
-        mean = mean + covariance * (miss / variance)[:, None]
-        shrink = 1 / (variance + np.sqrt(variance / precision))  # Potter's square root of the update
-        root = root - shrink[:, None, None] * covariance[:, :, None] * along[:, None, :]
-        log_mass += log_height - 0.5 * np.log(precision * variance) - 0.5 * miss**2 / variance
+        mean, root, log_factor = _times_gaussian(mean, root, index, centre, precision)
+        log_mass += log_height + log_factor
     return mean, root, log_mass
+
+
+def _times_gaussian(mean: Any, root: Any, index: int, centre: Any, precision: Any) -> tuple[Any, Any, Any]:
+    """Return means (..., q) and roots (..., q, q) times exp(-precision (b - centre)^2 / 2) of one parameter.
+
+    And the logarithms (...) of the masses. No digits are lost, however narrow that is (Potter's square root).
+    """
+    arrays = root.__array_namespace__()
+    along, miss = root[..., index, :], centre - mean[..., index]
+    covariance = (root @ along[..., None])[..., 0]
+    growth = 1 + precision * (along**2).sum(axis=-1)
+    mean = mean + covariance * (precision * miss / growth)[..., None]
+    shrink = precision / (growth + arrays.sqrt(growth))
+    root = root - shrink[..., None, None] * covariance[..., :, None] * along[..., None, :]
+    return mean, root, -0.5 * (arrays.log(growth) + precision * miss**2 / growth)

@@ -270,7 +270,7 @@ class Posterior(PosteriorPlots):
         Raises
         ------
         InputError
-            When the measurements are in another loading mode.
+            When the measurements are in another loading mode, or means were fitted in place of very many.
 
         Examples
         --------
