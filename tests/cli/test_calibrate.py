@@ -205,15 +205,19 @@ def force(parameters, depth):
 """
 
 
+def write_cube(folder, heading):
+    """Write seven measurements, as many as other tests of one parameter have: what is compiled serves all of them."""
+    (folder / "cube.py").write_text(PUNCH)
+    rows = [(depth, 3 * ((1 - depth) ** -2 - (1 - depth))) for depth in np.linspace(0.05, 0.3, 7)]
+    (folder / "cube.csv").write_text(f"depth,{heading}\n" + "".join(f"{a:.4f},{b:.5f}\n" for a, b in rows))
+
+
 @pytest.mark.slow
 def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(tmp_path):
-    (tmp_path / "cube.py").write_text(PUNCH)
-    depth = np.linspace(0.05, 0.3, 7)  # as many, and the prior, as in other tests, for whose shapes all is compiled
-    rows = zip(depth, 3 * ((1 - depth) ** -2 - (1 - depth)), strict=True)
-    (tmp_path / "punch.csv").write_text("depth,force\n" + "".join(f"{a:.4f},{b:.5f}\n" for a, b in rows))
+    write_cube(tmp_path, "force")
     usual = ["--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--noise-sd", 0.02, "--runs", 8]
     material = ["--material", "neo-hookean", "--range", "0.7:1.2", "--unit", "kPa", "--no-figures"]
-    said = run_in(tmp_path, "calibrate", "punch.csv", *usual, *material, "--out", "run")
+    said = run_in(tmp_path, "calibrate", "cube.csv", *usual, *material, "--out", "run")
     assert said.status == 0, said.err
     said = run_in(tmp_path, "predict", "run", "--at", "1.1", "--out", "predicted", "--no-figures")
     assert said.status == 0, said.err
@@ -230,8 +234,7 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
 
 
 def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the_model_is_said(tmp_path):
-    (tmp_path / "cube.py").write_text(PUNCH)
-    (tmp_path / "cube.csv").write_text("depth,stress (kPa)\n0.1,1.01\n0.2,2.3\n0.3,4.0\n")
+    write_cube(tmp_path, "stress (kPa)")
     usual = ["calibrate", "cube.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
     material = ["--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2", "--out", "run"]
     said = run_in(tmp_path, *usual, *material)
@@ -245,8 +248,7 @@ def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the
 
 @pytest.mark.parametrize(("unit", "status"), [("mmHg", 2), ("MPa", 0)])
 def test_pressures_in_another_unit_than_the_law_are_refused(cli, here, unit, status):
-    (here / "cube.py").write_text(PUNCH)
-    (here / "cube.csv").write_text(f"depth,pressure ({unit})\n0.1,1.01\n0.2,2.3\n0.3,4.0\n")
+    write_cube(here, f"pressure ({unit})")
     usual = ["calibrate", "cube.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
     said = cli(*usual, "--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2")
     assert said.status == status, said.err
@@ -264,27 +266,27 @@ def test_of_columns_of_one_name_the_number_is_asked_for(cli, here):
 
 
 def test_several_specimens_are_refused_until_one_is_read(tmp_path):
-    write_all(tmp_path)
-    heading, *rows = (tmp_path / "punch.csv").read_text().splitlines()
+    write_cube(tmp_path, "force (mN)")
+    heading, *rows = (tmp_path / "cube.csv").read_text().splitlines()
     others = [f"{depth},{1.5 * float(force):.5f}" for depth, force in (row.split(",") for row in rows)]
     labelled = [f"{name},{row}" for name, test in (("S1", rows), ("S2", others)) for row in test]
     (tmp_path / "both.csv").write_text("\n".join([f"specimen,{heading}", *labelled]))
-    arguments = ["calibrate", "both.csv", "--forward", "force.py:force", *USUAL, "--no-figures", "--out", "run"]
-    arguments += ["--control", "depth", "--measured", "force"]
-    said = run_in(tmp_path, *arguments)
+    arguments = ["calibrate", "both.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)"]
+    arguments += ["--noise-sd", 0.02, "--runs", 8, "--control", "depth", "--measured", "force", "--no-figures"]
+    said = run_in(tmp_path, *arguments, "--out", "run")
     assert said.status == 2
     assert "column 'specimen' names several tests: 'S1', 'S2'. To read one of them give --only 'specimen=S1'." in (
         " ".join(said.err.split())
     )
     assert not list(tmp_path.glob("run*"))
-    said = run_in(tmp_path, *arguments, "--only", "specimen=S2")
+    said = run_in(tmp_path, *arguments, "--only", "specimen=S2", "--out", "run")
     assert said.status == 0, said.err
     with (tmp_path / "run" / "prediction.csv").open(newline="") as lines:
         measured = [float(row["measured"]) for row in csv.DictReader(lines)]
     assert measured == [float(row.split(",")[1]) for row in others]
-    by_sensor = (tmp_path / "both.csv").read_text().replace("specimen", "sensor")
-    (tmp_path / "both.csv").write_text(by_sensor)  # of which a forward model may know that they are of one test
-    said = run_in(tmp_path, *arguments[:-6], "--out", "sensors", "--control", "depth", "--measured", "force")
+    by_sensor = [f"S{1 + number % 2},{row}" for number, row in enumerate(rows)]
+    (tmp_path / "both.csv").write_text("\n".join([f"sensor,{heading}", *by_sensor]))  # of one test, which a model knows
+    said = run_in(tmp_path, *arguments, "--out", "sensors")
     assert said.status == 0, said.err
 
 
@@ -369,7 +371,7 @@ def test_a_specimen_of_a_population_is_not_calibrated_beside_its_posterior(tmp_p
 
 
 def test_the_posterior_of_other_measurements_is_a_prior(fitted):
-    rows = [row.split(",") for row in (fitted / "tension.csv").read_text().splitlines()[1:]]
+    rows = [row.split(",") for row in (fitted / "tension.csv").read_text().splitlines()[3::2]]
     noise = 0.02 * np.random.default_rng(5).standard_normal(len(rows))
     other = "".join(f"{a},{float(b) + error:.4f}\n" for (a, b), error in zip(rows, noise, strict=True))
     (fitted / "other.csv").write_text("stretch,stress (kPa)\n" + other)

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 import tissuq as tq
+from marks import slow_but
 from thick_tubes import (
     HEADINGS,
     INNER,
@@ -19,6 +20,7 @@ from thick_tubes import (
     borne,
     fibres,
     fung,
+    gent,
     hoop_at,
     measured,
     mooney_rivlin,
@@ -68,8 +70,13 @@ def test_the_force_of_a_neo_hookean_rod_is_that_of_the_textbook():
 @pytest.mark.parametrize("law", [*LAWS, steeper_fibres])
 @pytest.mark.parametrize(
     "protocol",
-    [{"held": (1.4,), "at_rest": None}, {"at_rest": None}, {"held": ()}, {"held": (0.9, 1.1)}, {}],
-    ids=["one", "three", "extension", "short", "all"],
+    [
+        pytest.param({"held": (1.4,), "at_rest": None}, id="one", marks=pytest.mark.slow),
+        pytest.param({"at_rest": None}, id="three", marks=pytest.mark.slow),
+        pytest.param({"held": ()}, id="extension"),
+        pytest.param({"held": (0.9, 1.1)}, id="short", marks=pytest.mark.slow),
+        pytest.param({}, id="all"),
+    ],
 )
 def test_the_stresses_in_the_middle_of_the_wall_are_those_of_the_law(law, protocol):
     """The errors of docs/measures.md, in shares of the largest stress."""
@@ -92,7 +99,7 @@ def test_as_a_thin_wall_a_thick_one_has_other_stresses(ratio, of_hoop, of_axis):
     assert errors.tolist() == pytest.approx([of_hoop, of_axis], rel=0.02)
 
 
-@pytest.mark.parametrize("law", [*LAWS, steeper_fibres])
+@pytest.mark.parametrize("law", slow_but([gent, fung], [*LAWS, steeper_fibres]))
 def test_noise_of_the_loads_is_not_made_much_larger(law):
     """The largest errors of 20 tests with noise of half a percent stay below 4 % of the largest stress."""
     inner, outer = wall(0.4)

@@ -8,6 +8,7 @@ import pytest
 import tissuq as tq
 from against import assert_agrees
 from dense import Axis, Linear, Problem
+from marks import slow_but
 
 STRETCH = np.linspace(0.75, 1.6, 12)
 
@@ -143,10 +144,11 @@ def test_a_process_beside_growing_noise_goes_to_nuts_with_an_evidence_by_smc(mon
     assert posterior.data.attrs["method_reason"] == reason
 
 
-def test_three_terms_with_everything_unknown_are_summed():
+@pytest.mark.parametrize("discrepancy", slow_but(["constant"], ["constant", "yeoh"]))
+def test_three_terms_with_everything_unknown_are_summed(discrepancy):
     truth = {"mu1": 0.5, "mu2": 0.1, "mu3": 0.2, "alpha1": 1.3, "alpha2": 5.0, "alpha3": -2.0}
     data = tq.simulate("ogden-3", truth, np.linspace(0.7, 1.6, 14), 0.3, seed=1)
-    posterior = tq.fit(data, material="ogden-3", discrepancy="yeoh")
+    posterior = tq.fit(data, material="ogden-3", discrepancy=discrepancy)
     assert posterior.model.nonlinear == ("alpha1", "alpha2", "alpha3", "S", "noise_sd")
     assert posterior.solution.route == "exact"
     assert 0 < posterior.log_evidence_error < 0.1

@@ -97,7 +97,7 @@ class Population(PopulationDraws):
         --------
         >>> import tissuq as tq
         >>> stretch = [0.8, 0.9, 1.1, 1.2, 1.3]
-        >>> moduli = {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45}
+        >>> moduli = {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45, "f": 0.55}
         >>> specimens = {name: tq.simulate("neo-hookean", {"C10": modulus}, stretch, noise_sd=0.01, seed=seed)
         ...              for seed, (name, modulus) in enumerate(moduli.items())}
         >>> answer = tq.fit_population(specimens, discrepancy="none", noise_sd=0.01).answer
