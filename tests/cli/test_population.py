@@ -252,6 +252,18 @@ def test_warnings_about_files_are_told_with_their_specimens(here):
     assert any(text.startswith(UNITS_ASSUMED) for text in told)
 
 
+def test_files_that_name_the_same_specimen_are_tests_of_it(here):
+    (here / "all" / "S3").mkdir(parents=True)
+    names = {"a.csv": "A12", "b.csv": "A12", "c.csv": "B7", "S3/first.csv": "A12", "S3/second.csv": "B7"}
+    for seed, (file, specimen) in enumerate(names.items()):
+        lines = [f"Specimen: {specimen}", "stretch,stress_kPa", *rows_of(40.0, seed)]
+        (here / "all" / file).write_text("\n".join(lines) + "\n")
+    readings = PopulationSettings(files=("all",)).readings()
+    assert {name: len(of_one) for name, of_one in readings.items()} == {"S3": 2, "A12": 2, "c": 1}
+    with pytest.raises(tq.InputError, match=r"there are 1 \(A12\).*put each into a folder named after its specimen"):
+        population.run_population(PopulationSettings(files=("all/a.csv", "all/b.csv")))
+
+
 def test_specimens_are_left_out_by_name(here):
     write_all(here)
     settings = PopulationSettings(files=("specimens",), without=("S1", "S5"))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from itertools import repeat
+from itertools import chain, repeat
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
@@ -181,12 +182,12 @@ class PopulationSettings(FittedSettings, ReadingSettings):
     """Everything that a population depends on; the noise in the files' unit of stress.
 
     Without a mode every test says its own, as for `tissuq.read_experiment`. Of a file of several tests each is of a
-    specimen of its own.
+    specimen of its own; files that name the same specimen are tests of it.
     """
 
     files: tuple[str, ...] = argument(
         ...,
-        "Files, a specimen each; or folders of them, in which a folder is a specimen with a file a test.",
+        "Files, a specimen each, or tests of one that they name; or folders of them, in which a folder is a specimen.",
         takes=list[Path],
         min_length=1,
     )
@@ -273,22 +274,25 @@ class PopulationSettings(FittedSettings, ReadingSettings):
 
     def _all_readings(self, folder: Path) -> dict[str, list[Reading]]:
         from tissuq.experiments.reading.specimens_in_files import of_specimen, read_column
-        from tissuq.experiments.reading.tests_in_file import find_tests_in_file
+        from tissuq.experiments.reading.tests_in_file import TestInFile, find_tests_in_file
 
         sources = self.sources(folder)
         if self.specimen is not None:
             (file,) = next(iter(sources.values()))
             return read_column(file, self.specimen, **self.reading_options)
-        specimens: dict[str, list[Reading]] = {}
+        options, tests_of = self.reading_options, dict[str, list[TestInFile]]()
         for name, files in sources.items():
-            is_one_of_several, options = len(files) > 1, self.reading_options
-            tests = [
-                test
-                for file in files
-                for test in find_tests_in_file(file, is_one_of_several=is_one_of_several, **options)
-            ]
+            in_files = (find_tests_in_file(file, is_one_of_several=len(files) > 1, **options) for file in files)
+            tests_of[name] = [*chain.from_iterable(in_files)]
+        single_files = [tests for name, tests in tests_of.items() if len(sources[name]) == 1]
+        stated = [{test.reading.experiment.specimen for test in tests} for tests in single_files]
+        files_of = Counter(chain.from_iterable(stated))
+        specimens: dict[str, list[Reading]] = {}
+        for name, tests in tests_of.items():
             for test in tests:
-                is_one = len(files) > 1 or len(tests) == 1
-                specimen = name if is_one else test.reading.experiment.specimen or test.name
-                specimens.setdefault(specimen, []).append(of_specimen(test.reading, specimen))
+                specimen = test.reading.experiment.specimen
+                if len(sources[name]) > 1 or (len(tests) == 1 and not (specimen and files_of[specimen] > 1)):
+                    specimen = name
+                label = specimen or test.name
+                specimens.setdefault(label, []).append(of_specimen(test.reading, label))
         return specimens

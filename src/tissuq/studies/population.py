@@ -18,6 +18,7 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
 from tissuq.population.covariates import covariates_of
+from tissuq.population.pooling import MIN_SPECIMENS
 from tissuq.result_warning import ResultWarning, has_code, merged, most_severe_first
 from tissuq.studies.fit_settings import PopulationSettings
 
@@ -78,6 +79,12 @@ def run_population(
     tests = {
         name: [reading.experiment for reading in specimen_readings] for name, specimen_readings in readings.items()
     }
+    if len(tests) < MIN_SPECIMENS:
+        raise InputError(
+            f"a population needs {MIN_SPECIMENS} specimens or more; there are {len(tests)} ({', '.join(tests)}). Give "
+            "files of more, or use tissuq fit. Files that name the same specimen are tests of it; where they are of "
+            "others all the same, put each into a folder named after its specimen, and give the folder of all."
+        )
     units = _units(tests)
     if settings.noise_sd != "unknown" and len(units) > 1:
         raise InputError(
