@@ -285,13 +285,13 @@ class PopulationSettings(FittedSettings, ReadingSettings):
             in_files = (find_tests_in_file(file, is_one_of_several=len(files) > 1, **options) for file in files)
             tests_of[name] = [*chain.from_iterable(in_files)]
         single_files = [tests for name, tests in tests_of.items() if len(sources[name]) == 1]
-        stated = [{test.reading.experiment.specimen for test in tests} for tests in single_files]
+        stated = ({test.reading.experiment.specimen for test in tests} - {""} for tests in single_files)
         files_of = Counter(chain.from_iterable(stated))
         specimens: dict[str, list[Reading]] = {}
         for name, tests in tests_of.items():
             for test in tests:
                 specimen = test.reading.experiment.specimen
-                if len(sources[name]) > 1 or (len(tests) == 1 and not (specimen and files_of[specimen] > 1)):
+                if len(sources[name]) > 1 or (len(tests) == 1 and files_of[specimen] < 2):
                     specimen = name
                 label = specimen or test.name
                 specimens.setdefault(label, []).append(of_specimen(test.reading, label))

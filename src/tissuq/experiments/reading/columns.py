@@ -19,7 +19,7 @@ from tissuq.experiments.reading.column_checks import (
     with_types,
 )
 from tissuq.experiments.reading.columns_of_tube import columns_of_tube, with_columns_of_tube
-from tissuq.experiments.reading.headings import contents_of, on_axis, on_axis_by_unit
+from tissuq.experiments.reading.headings import contents_of, on_axes_by_unit, on_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -202,7 +202,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
     names, axes = [on_axis(name) for name, _ in _names(table)], _axes_of(table)
     if len(axes) == 2:
-        names = [name if name[0] else on_axis_by_unit(name[1], table.unit(k)) for k, name in enumerate(names)]
+        names = on_axes_by_unit(names, [*map(table.unit, range(len(names)))])
     if not mapping:
         names = _without_empty(table, names)
     if axis is not None and axis not in axes:

@@ -73,8 +73,7 @@ def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
     A unit that was assumed may make the answer wrong by a factor of 100 or 1000.
     """
     labels = reading.used.labels
-    doubtful = "doubtful-reading", Severity.PROBLEM
-    warnings = [ResultWarning(text, *doubtful if is_doubtful(text) else CAUTION) for text in reading.notes]
+    warnings = [ResultWarning(text, *DOUBTFUL if is_doubtful(text) else CAUTION) for text in reading.notes]
     for kind in dict.fromkeys(region.kind for regions in reading.regions for region in regions):
         of_kind = ([region.text for region in regions if region.kind == kind] for regions in reading.regions)
         texts = labelled(labels, [" ".join(sentences) for sentences in of_kind])
@@ -392,10 +391,11 @@ def _is_held(reading: Reading, number: int, column: int) -> bool:
 
 
 CAUTION, NOTE = ("measurements", Severity.CAUTION), ("measurements", Severity.NOTE)
+DOUBTFUL = "doubtful-reading", Severity.PROBLEM
 CHECKS: Mapping[Callable[[Reading, int], str], tuple[str, Severity]] = {
     _other_axis: CAUTION,
     _shear: CAUTION,
-    _creep: ("doubtful-reading", Severity.PROBLEM),
+    _creep: DOUBTFUL,
     _size: CAUTION,
     _stretch_size: CAUTION,
     _cycles: CAUTION,

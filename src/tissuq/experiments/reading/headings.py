@@ -36,6 +36,7 @@ __all__ = [
     "is_of_specimens",
     "measure_in",
     "of_spread",
+    "on_axes_by_unit",
     "on_axis",
     "on_lettered_axis",
     "plain",
@@ -338,14 +339,18 @@ def on_lettered_axis(quantity: str) -> tuple[str, str]:
     return ("", quantity) if is_numbered else (axis, name)
 
 
-def on_axis_by_unit(quantity: str, unit: str) -> tuple[str, str]:
-    """Return the axis and the name of a column whose symbol its unit makes one of a load, where others have axes.
+def on_axes_by_unit(names: Sequence[tuple[str, str]], units: Sequence[str]) -> list[tuple[str, str]]:
+    """Return axes and names of columns, where others have axes also of a symbol that its unit makes one of a load.
 
     Examples
     --------
-    >>> on_axis_by_unit("p1", "kPa"), on_axis_by_unit("fx", "N"), on_axis_by_unit("f x", ""), on_axis_by_unit("f1", "")
-    (('x', 'p'), ('x', 'force'), ('x', 'force'), ('', 'f1'))
+    >>> on_axes_by_unit([("", "p1"), ("", "fx"), ("", "f x"), ("", "f1"), ("y", "p")], ["kPa", "N", "", "", "kPa"])
+    [('x', 'p'), ('x', 'force'), ('x', 'force'), ('', 'f1'), ('y', 'p')]
     """
+    return [name if name[0] else _on_axis_by_unit(name[1], unit) for name, unit in zip(names, units, strict=True)]
+
+
+def _on_axis_by_unit(quantity: str, unit: str) -> tuple[str, str]:
     symbol, axis, kind = quantity[:1], quantity[1:].strip(), measured_in(unit)
     if axis in AXES and symbol in COMPONENTS["stress"] and kind == "stress":
         return AXES[axis], symbol

@@ -19,8 +19,8 @@ from tissuq.experiments.reading.headings import (
     STRESS_NOUNS,
     heading,
     measure_in,
+    on_axes_by_unit,
     on_axis,
-    on_axis_by_unit,
     on_lettered_axis,
 )
 from tissuq.experiments.reading.options import ReadingOptions
@@ -287,7 +287,7 @@ def _mode_of_columns(table: Table, sizes: Collection[str]) -> tuple[str, str]:
     is_of_sheet = SIZES_OF_SHEET.issubset(sizes)
     on_axes = [(on_axis if is_of_sheet else on_lettered_axis)(quantity) for quantity in quantities]
     if any(axis and name in deformations for axis, name in on_axes):
-        on_axes = [one if one[0] else on_axis_by_unit(one[1], table.unit(k)) for k, one in enumerate(on_axes)]
+        on_axes = on_axes_by_unit(on_axes, [*map(table.unit, range(len(on_axes)))])
     kinds = ["load" if name in loads else name for _, name in on_axes if name in deformations | loads]
     kinds = ["stretch" if name in ROLES["stretch"] | ROLES["strain"] else name for name in kinds]
     are_numbered = not any(on_lettered_axis(quantity)[0] for quantity in quantities)

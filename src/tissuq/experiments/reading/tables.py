@@ -248,8 +248,8 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         header_line, header = _comment_above(filled, first_line)
     else:
         header_line, header = content[layout.names]
-    above = [text for line, text in filled if line < first_line]
-    names = names_said_otherwise(above, texts[layout.first_row :], layout.separator, layout.width)
+    head, rows = filled[: bisect_left(filled, (first_line, ""))], texts[layout.first_row :]
+    names = names_said_otherwise([text for _, text in head], rows, layout.separator, layout.width)
     names = names or column_names(header, layout.width, layout.separator, has_units=layout.units is not None)
     width = len(names) or layout.width
     if width > MOST_COLUMNS:
@@ -264,9 +264,9 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         names=padded(names, width),
         units=padded(units, width),
         separator=layout.separator,
-        rows=texts[layout.first_row :],
+        rows=rows,
         lines=[line for line, _ in content[layout.first_row :]],
-        head=[(line, text) for line, text in filled if line < first_line],
+        head=head,
         sheet=sheet,
         title=number or title_of(texts[: layout.names or 0], separator),
     )

@@ -253,15 +253,15 @@ class _EnergySums:
         features = {int(member): self.model.energy_features(member) for member in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in blocks) for blocks in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
-        numbers, data_sets = np.unique(node, return_inverse=True)
+        numbers, designs = np.unique(node, return_inverse=True)
         outer = np.array([self._nodes[number].outer for number in numbers])
         for alike in self._outer.alike(outer, SETTINGS_AT_ONCE):
-            rows, is_alike = self._outer.rows(outer[alike]), np.isin(data_sets, alike)
+            rows, is_alike = self._outer.rows(outer[alike]), np.isin(designs, alike)
             for member in np.unique(points.lattice[is_alike]):
                 of_member = np.flatnonzero(is_alike & (points.lattice == member))
                 amplitudes = points.amplitudes[of_member][:, list(self.model.energy_members[member].amplitude_indices)]
                 linear_mean, linear_root = Reduced(rows, features[member]).linear_and_weights(
-                    data_sets[of_member] - alike[0], amplitudes, points.noise_sd[of_member]
+                    designs[of_member] - alike[0], amplitudes, points.noise_sd[of_member]
                 )
                 linear_mean, linear_root, _ = self._priors.times(linear_mean, linear_root)
                 q = linear_mean.shape[1]

@@ -93,32 +93,32 @@ class Reduced:
     Parameters
     ----------
     rows : Rows
+        With one data set a design.
     features : list of (n, r) arrays
         The stresses of each block's terms at the measurements.
     """
 
     def __init__(self, rows: Rows, features: list[FloatArray]) -> None:
-        self._parameters, self._per_design = rows.design.shape[2], rows.stresses.shape[2]
+        self._parameters = rows.design.shape[2]
         self._sizes = [block.shape[1] for block in features]
         blocks = side_by_side([block / rows.scale[:, None] for block in features], len(rows.scale))
         blocks = np.broadcast_to(blocks, (len(rows.design), *blocks.shape))
         basis, self._triangle = np.linalg.qr(np.concatenate([rows.design, blocks], axis=2))
-        self._data = basis.swapaxes(1, 2) @ rows.stresses
+        self._data = (basis.swapaxes(1, 2) @ rows.stresses)[:, :, 0]
 
     def linear_and_weights(
-        self, data_sets: IndexArray, amplitudes: FloatArray, noise_sd: FloatArray
+        self, designs: IndexArray, amplitudes: FloatArray, noise_sd: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return means (M, q) and roots (M, q, q) of the material's parameters and the discrepancy's weights.
 
-        For any amplitudes (M, blocks) and noise (M,), of data sets (M,).
+        For any of the designs (M,), amplitudes (M, blocks) and noise (M,).
         """
-        design, number = np.divmod(data_sets, self._per_design)
         p, k, q = self._parameters, self._triangle.shape[1], self._parameters + sum(self._sizes)
         scale = np.ones((len(noise_sd), q))
         scale[:, p:] = np.repeat(amplitudes, self._sizes, axis=1)
         rows = np.zeros((len(noise_sd), k + q - p, q + 1))
-        rows[:, :k, :q] = self._triangle[design] * (scale / noise_sd[:, None])[:, None]
-        rows[:, :k, q] = self._data[design, :, number] / noise_sd[:, None]
+        rows[:, :k, :q] = self._triangle[designs] * (scale / noise_sd[:, None])[:, None]
+        rows[:, :k, q] = self._data[designs] / noise_sd[:, None]
         rows[:, k:, p:q] = np.eye(q - p)
         triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
         root = np.asarray(np.linalg.inv(triangle[:, :q, :q]), dtype=np.float64)
