@@ -71,7 +71,8 @@ class AmplitudeLattice:
     components : int
         Components, at most, that represent a posterior in draws and predictions.
     guide : Guide
-        Where parameters lie that no lattice sums over; kept from one model to the next, which must be similar.
+        Where amplitudes lie, and parameters that no lattice sums over; kept from one model to the next, which must be
+        similar.
     """
 
     components: int = MAX_COMPONENTS
@@ -117,7 +118,7 @@ class AmplitudeLattice:
                 few = bounded_points // OUTER_BOUNDED_DIVISOR
                 sums = (_EnergySums(model, *weighted_nodes(model, self.guide), few) for model in models)
                 return [energy_sums.solution(self.components, seed) for energy_sums in sums]
-            nodes = single_nodes(models)
+            nodes = single_nodes(models, self.guide.reach)
             sums = (
                 _EnergySums(model, [node], np.zeros(1), 0.0, bounded_points)
                 for model, node in zip(models, nodes, strict=True)

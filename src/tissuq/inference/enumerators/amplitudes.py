@@ -19,9 +19,9 @@ from tissuq.parameters.priors import Prior
 __all__ = [
     "NEGLIGIBLE_SHARE",
     "Points",
+    "PointsAtKnownNoise",
     "Weighing",
     "at_end",
-    "known_log_weights",
     "linear_at",
     "log_prior_of_amplitude",
     "log_prior_of_noise",
@@ -89,6 +89,55 @@ class Points:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class PointsAtKnownNoise:
+    """All points of several lattices at a known noise, one lattice after another: N points, b data sets.
+
+    Weights and misfits (N, b) are as if the linear parameters had no priors.
+    """
+
+    lattice: IndexArray
+    second_index: IndexArray
+    first_index: IndexArray
+    noise_sd: float
+    amplitudes: FloatArray
+    log_weight: FloatArray
+    misfit: FloatArray
+
+    @classmethod
+    def of(cls, model: StatisticalModel, lattices: Sequence[Lattice], data_sets: slice) -> PointsAtKnownNoise:
+        """Return those of some data sets at the noise of a model."""
+        noise_sd = float(model.noise.sd({}, 0.0))
+        places = [np.indices(lattice.misfit.shape[:2]).reshape(2, -1) for lattice in lattices]
+        amplitudes = [
+            _amplitudes(model, lattice, *indices) * noise_sd for lattice, indices in zip(lattices, places, strict=True)
+        ]
+        log_weights = [_known_log_weights(model, lattice, data_sets) for lattice in lattices]
+        misfits = [lattice.misfit[:, :, data_sets] for lattice in lattices]
+        weights, misfit = (
+            np.concatenate([array.reshape(-1, array.shape[2]) for array in arrays]) for arrays in (log_weights, misfits)
+        )
+        numbers = np.repeat(np.arange(len(lattices)), [indices.shape[1] for indices in places])
+        second_index, first_index = np.concatenate(places, axis=1)
+        return cls(numbers, second_index, first_index, noise_sd, np.concatenate(amplitudes), weights, misfit)
+
+    def among(self, data_set: int, matters: BoolArray) -> Points:
+        """Return the points that matter (N,) of one data set."""
+        rows = np.flatnonzero(matters)
+        nothing = np.zeros(len(rows))
+        return Points(
+            self.lattice[rows],
+            self.second_index[rows],
+            self.first_index[rows],
+            np.full(len(rows), self.noise_sd),
+            self.amplitudes[rows],
+            self.log_weight[rows, data_set],
+            self.misfit[rows, data_set],
+            nothing,
+            nothing,
+        )
+
+
 class Weighing:
     """The posterior of amplitudes and noise of one data set on lattices, one for each member.
 
@@ -100,9 +149,8 @@ class Weighing:
         Of the data set in the lattices.
     ratios : mapping of str to float
         Values, over noise_sd, of the other parameters of the noise.
-    log_weights : sequence of (G2, G1) array, optional
-        Of the data set on each lattice, as `known_log_weights` has them, where the noise is known; for several data
-        sets of one model they are quicker to compute together.
+    at_known_noise : PointsAtKnownNoise, optional
+        Those of all data sets, where the noise is known: for one model they are quicker to compute together.
     """
 
     def __init__(
@@ -111,12 +159,11 @@ class Weighing:
         lattices: Sequence[Lattice],
         index: int,
         ratios: Mapping[str, float] = MappingProxyType({}),
-        log_weights: Sequence[FloatArray] | None = None,
+        at_known_noise: PointsAtKnownNoise | None = None,
     ) -> None:
         self._model, self._lattices, self._index, self._ratios = model, lattices, index, ratios
         self._least_log_weight = -np.inf
-        if log_weights is not None:
-            self.__dict__["_log_weights"] = log_weights
+        self._of_all = at_known_noise
         self._ends, self._priors = _ends(model, ratios), LinearPriors(model)
         self._is_pulled = self._priors.is_gaussian
 
@@ -149,7 +196,7 @@ class Weighing:
         return points[mass >= _least_that_matters(mass)], error
 
     def _roughly(self) -> list[Points]:
-        """Return the points that matter of every lattice, each at one noise."""
+        """Return the points that matter, each at one noise: of every lattice, or at a known noise of all together."""
         if not self._model.noise.parameters and not self._priors.is_gaussian:
             return self._cut_at_known_noise() if self._is_pulled else self._at_known_noise()
         points_of_members = [self._best_noise(member) for member in range(len(self._lattices))]
@@ -157,40 +204,30 @@ class Weighing:
         least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT_LOG_DROP))
         return [points[mass >= least_mass] for points, mass in zip(points_of_members, masses, strict=True)]
 
-    @cached_property
-    def _log_weights(self) -> Sequence[FloatArray]:
-        """The log weights (G2, G1) on each lattice at the known noise."""
-        data_set = slice(self._index, self._index + 1)
-        return [known_log_weights(self._model, lattice, data_set)[:, :, 0] for lattice in self._lattices]
-
     def _at_known_noise(self) -> list[Points]:
-        """Return the points that matter of every lattice at the known noise, of which only these are made."""
-        top = max(log_weights.max() for log_weights in self._log_weights)
-        masses = [np.exp(log_weights - top) for log_weights in self._log_weights]
-        least_mass = max(
-            _least_that_matters(np.concatenate([mass.ravel() for mass in masses])), np.exp(-IRRELEVANT_LOG_DROP)
-        )
-        return [self._known(member, mass >= least_mass) for member, mass in enumerate(masses)]
+        """Return the points that matter at the known noise, of which only these are made."""
+        points, data_set = self._all_points
+        log_weight = points.log_weight[:, data_set]
+        mass = np.exp(log_weight - log_weight.max())
+        least_mass = max(_least_that_matters(mass), np.exp(-IRRELEVANT_LOG_DROP))
+        return [points.among(data_set, mass >= least_mass)]
 
     def _cut_at_known_noise(self) -> list[Points]:
-        """Return the points that matter where bounds, which only take away, leave little; those of all lattices."""
-        matters = [log_weights >= self._least_log_weight for log_weights in self._log_weights]
-        points = Points.joined([self._known(member, mask) for member, mask in enumerate(matters)])
+        """Return the points that matter where bounds, which only take away, leave little."""
+        all_points, data_set = self._all_points
+        points = all_points.among(data_set, all_points.log_weight[:, data_set] >= self._least_log_weight)
         mean, root = linear_at(self._lattices, self._index, points)
         ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
         points = replace(points, log_inside=ceiling)
         (mass,) = _masses([points])
         return [points[mass >= max(_least_that_matters(mass), np.exp(-IRRELEVANT_LOG_DROP))]]
 
-    def _known(self, member: int, mask: BoolArray) -> Points:
-        """Return points of a lattice (G2, G1) at the known noise, as if the linear parameters had no priors."""
-        lattice, (second_index, first_index) = self._lattices[member], np.nonzero(mask)
-        count = len(first_index)
-        noise_sd, nothing = np.full(count, float(self._model.noise.sd({}, 0.0))), np.zeros(count)
-        amplitudes = self._amplitudes(lattice, second_index, first_index, noise_sd)
-        log_weight = self._log_weights[member][second_index, first_index]
-        misfit, numbers = lattice.misfit[second_index, first_index, self._index], np.full(count, member)
-        return Points(numbers, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, nothing, nothing)
+    @cached_property
+    def _all_points(self) -> tuple[PointsAtKnownNoise, int]:
+        """All points at the known noise, and the data set's number among theirs."""
+        if self._of_all is not None:
+            return self._of_all, self._index
+        return PointsAtKnownNoise.of(self._model, self._lattices, slice(self._index, self._index + 1)), 0
 
     def _are_cut(self, point_sets: Sequence[Points]) -> bool:
         """Return whether the bounds of linear parameters take away much; and learn below which weight nothing matters.
@@ -262,29 +299,31 @@ class Weighing:
         )
         strain, log_inside = np.zeros(len(first_index)), np.zeros(len(first_index))
         if self._is_pulled:
-            mean, root = lattice.linear(self._index, second_index, first_index)
+            scores_and_roots = lattice.scores_and_roots(self._index, second_index, first_index)
+            mean, root = lattice.linear(self._index, *scores_and_roots)
             strain = self._priors.strain(mean, root) if self._model.noise.parameters else strain
             mean, root, log_mass = self._priors.times(mean, root * noise_sd[:, None, None])
             log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
-        amplitudes = self._amplitudes(lattice, second_index, first_index, noise_sd)
+        amplitudes = _amplitudes(self._model, lattice, second_index, first_index) * noise_sd[:, None]
         for amplitude, indices in zip(lattice.member.amplitude_indices, (first_index, second_index), strict=False):
             log_weight += log_prior_of_amplitude(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
             log_weight += _log_cells(indices, lattice.step)
         misfit, numbers = lattice.misfit[second_index, first_index, self._index], np.full(len(first_index), member)
         return Points(numbers, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
 
-    def _amplitudes(
-        self, lattice: Lattice, second_index: IndexArray, first_index: IndexArray, noise_sd: FloatArray
-    ) -> FloatArray:
-        """Return the amplitudes (M, a) at points of a lattice; zero where its member has no such block."""
-        amplitudes = np.zeros((len(first_index), len(self._model.energy_symbols)))
-        grids = zip(lattice.ratios, (first_index, second_index), strict=True)
-        for amplitude, (grid, indices) in zip(lattice.member.amplitude_indices, grids, strict=False):
-            amplitudes[:, amplitude] = grid[indices] * noise_sd
-        return amplitudes
+
+def _amplitudes(
+    model: StatisticalModel, lattice: Lattice, second_index: IndexArray, first_index: IndexArray
+) -> FloatArray:
+    """Return the amplitudes (M, a) at points of a lattice for unit noise; zero where its member has no such block."""
+    amplitudes = np.zeros((len(first_index), len(model.energy_symbols)))
+    grids = zip(lattice.ratios, (first_index, second_index), strict=True)
+    for amplitude, (grid, indices) in zip(lattice.member.amplitude_indices, grids, strict=False):
+        amplitudes[:, amplitude] = grid[indices]
+    return amplitudes
 
 
-def known_log_weights(model: StatisticalModel, lattice: Lattice, data_sets: slice) -> FloatArray:
+def _known_log_weights(model: StatisticalModel, lattice: Lattice, data_sets: slice) -> FloatArray:
     """Return the log weights (G2, G1, b) of some data sets at all points of a lattice at the known noise of a model.
 
     As if the linear parameters had no priors.
@@ -321,14 +360,15 @@ def linear_at(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[
     points : Points
     """
     p = lattices[0].parameters
-    mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
+    scores, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
     order = np.argsort(points.lattice, kind="stable")
     ends = np.searchsorted(points.lattice[order], np.arange(len(lattices) + 1))
     for lattice, start, end in zip(lattices, ends[:-1], ends[1:], strict=True):
         if end > start:
             rows = order[start:end]
-            mean[rows], root[rows] = lattice.linear(index, points.second_index[rows], points.first_index[rows])
-    return mean, root
+            places = points.second_index[rows], points.first_index[rows]
+            scores[rows], root[rows] = lattice.scores_and_roots(index, *places)
+    return lattices[0].linear(index, scores, root)
 
 
 def _log_cells(place_on_grid: IndexArray, step: float) -> FloatArray:

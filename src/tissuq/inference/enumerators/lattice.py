@@ -264,12 +264,22 @@ class Lattice:
         log_size = np.repeat(self.log_size, self._per_design, axis=2)[:, :, data_sets]
         return np.asarray(-self.freedom * log_noise - 0.5 / noise_sd**2 * self.misfit[:, :, data_sets] - log_size)
 
-    def linear(self, data_set: int, second_index: IndexArray, first_index: IndexArray) -> tuple[FloatArray, FloatArray]:
-        """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise."""
+    def scores_and_roots(
+        self, data_set: int, second_index: IndexArray, first_index: IndexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what `linear` needs (M, p) and (M, p, p) of points of this lattice."""
         design, number = divmod(data_set, self._per_design)
-        root = self._root[second_index, first_index, design]
-        shift = (root @ self._scores[second_index, first_index, design, :, number][:, :, None])[:, :, 0]
+        scores = self._scores[:, :, design, :, number]
+        return scores[second_index, first_index], self._root[second_index, first_index, design]
+
+    def linear(self, data_set: int, scores: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise.
+
+        At points of this lattice or of others with the same rows.
+        """
+        design, number = divmod(data_set, self._per_design)
         inverse = self._inverse[design]
+        shift = (root @ scores[:, :, None])[:, :, 0]
         return (self._centre[design, :, number] + shift) @ inverse.T, inverse @ root
 
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tissuq.arrays import FloatArray, IndexArray
-from tissuq.inference.enumerators.amplitudes import Points, Weighing, at_end, known_log_weights, linear_at
+from tissuq.inference.enumerators.amplitudes import Points, PointsAtKnownNoise, Weighing, at_end, linear_at
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, MAX_STRESS_RATIO, Directions, Lattice, Rows
 from tissuq.inference.enumerators.outer import Outer
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["OUTER_STEP", "SETTINGS_AT_ONCE", "Node", "Sums", "single_nodes"]
+__all__ = ["OUTER_STEP", "SETTINGS_AT_ONCE", "Node", "Reach", "Sums", "single_nodes"]
 
 
 UNLIKELY_PROBABILITY = 1e-3
@@ -64,16 +64,24 @@ class Node:
         return float(np.logaddexp.reduce(self.points.log_mass))
 
 
-def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
+@dataclass
+class Reach:
+    """Whether the lattices of the last model went on beyond what suffices mostly: those of a similar one begin so."""
+
+    is_long: bool = False
+
+
+def single_nodes(models: Sequence[StatisticalModel], reach: Reach) -> list[Node]:
     """Return the posteriors of models on the same stretches that have no outer parameters."""
     stresses = np.array([model.stress for model in models]).T
     rows = Rows(models[0].design[None], stresses[None], np.ones(len(stresses)), models[0].experiment.size)
     terms, members = _Terms(models), range(len(models[0].energy_members))
-    for largest in _largest_ratios(models):
+    for largest in _largest_ratios(models)[-1 if reach.is_long else 0 :]:
         lattices = [Lattice(terms.directions(member, rows.scale, largest=largest), rows) for member in members]
         sums = [Weighing(model, lattices, index).points() for index, model in enumerate(models)]
         if not any(at_end(lattices, points).any() for points, _ in sums):
             break
+        reach.is_long = True
     nodes = []
     for index, (points, error) in enumerate(sums):
         points = _thinned(points, MAX_POINTS, 0.5)
@@ -133,10 +141,9 @@ class Sums:
         rows, ratios = self._outer.rows(settings), self._outer.ratios(settings[0])
         lattices = [Lattice(self._directions(rows.scale, int(member), turn), rows) for member in members]
         is_known = not self.model.noise.parameters
-        logs = [known_log_weights(self.model, lattice, slice(None)) for lattice in lattices] if is_known else []
+        at_known_noise = PointsAtKnownNoise.of(self.model, lattices, slice(None)) if is_known else None
         for index in range(len(settings)):
-            of_setting = [log_weights[:, :, index] for log_weights in logs] or None
-            yield lattices, index, Weighing(self.model, lattices, index, ratios, of_setting)
+            yield lattices, index, Weighing(self.model, lattices, index, ratios, at_known_noise)
 
     def _directions(self, scale: FloatArray, member: int, turn: int) -> Directions:
         """Return the directions of one member, remembered while the relative noise stays the same."""

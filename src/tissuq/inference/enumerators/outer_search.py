@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE, Accuracy, first_places, known_along, peaks
-from tissuq.inference.enumerators.nodes import Node, Sums
+from tissuq.inference.enumerators.nodes import Node, Reach, Sums
 from tissuq.inference.enumerators.outer import TINY, Outer
 from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, Proposal, adapted, effective
 from tissuq.model.scales import MAX_SCORE
@@ -31,7 +31,7 @@ NEGLIGIBLE_MEMBERS = 1e-3
 
 @dataclass
 class Guide:
-    """Where the posterior of the outer parameters was last: what the search in a similar model begins with.
+    """Where the posterior of amplitudes and outer parameters was last: what the search in a similar model begins with.
 
     A lower accuracy takes fewer values.
     """
@@ -40,6 +40,7 @@ class Guide:
     places: FloatArray | None = None
     peaks: FloatArray | None = None
     proposal: Proposal | None = None
+    reach: Reach = field(default_factory=Reach)
 
 
 def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
