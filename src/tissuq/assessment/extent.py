@@ -244,9 +244,10 @@ def assess(
     likely = at_level(model)  # where the noise would be summed over, other priors are tried at its level
     reference, rescaled_solutions = solution, dict[str, Solution]()
     if is_rescaled:
-        with suppress(ConvergenceError):
-            reference = solution if likely is model else solve_alike([likely])[0]
-            rescaled_solutions = _rescaled(likely, solve_alike)
+        with suppress(ConvergenceError, ModelError):
+            models = [likely, *(rescaled(likely, factor) for factor in SCALE_FACTORS.values())]
+            reference, *others = [solution, *solve_alike(models[1:])] if likely is model else solve_alike(models)
+            rescaled_solutions = dict(zip(SCALE_FACTORS, others, strict=True))
     expected = reference.marginals[model.headline].mean
     return Assessment(
         parameter=model.headline,
@@ -298,15 +299,6 @@ def _solved(model: StatisticalModel, solve: Solve) -> Solution | None:
         return solve([model])[0]
     except ModelError:  # the requested sampler has nothing to sample, or nothing is stable
         return None
-
-
-def _rescaled(model: StatisticalModel, solve: Solve) -> dict[str, Solution]:
-    """Return the solutions with other prior scales of the discrepancy's random part, where there are any."""
-    solutions = {}
-    for name, factor in SCALE_FACTORS.items():
-        with suppress(ConvergenceError, ModelError):
-            solutions[name] = solve([rescaled(model, factor)])[0]
-    return solutions
 
 
 def _evidence_changes(solution: Solution, rescaled_solutions: Mapping[str, Solution]) -> dict[str, float]:
