@@ -10,6 +10,8 @@ from scipy.stats import halfcauchy
 import tissuq as tq
 from marks import slow_but
 from tissuq.errors import TissuqError
+from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
+from tissuq.inference.enumerators.lattice import Lattice
 from tissuq.model.discrepancy import discrepancy_named
 
 STRETCH = np.array([0.7, 0.8, 0.9, 0.95, 1.1, 1.2, 1.35, 1.5, 1.7, 1.9, 2.1, 2.4])
@@ -203,6 +205,20 @@ def test_a_lattice_that_ends_too_soon_is_made_again(monkeypatch, largest):
     again = tq.fit(data, discrepancy="taylor", noise_sd=NOISE_SD)
     assert again.log_evidence == pytest.approx(evidence, abs=1e-6)
     np.testing.assert_allclose(again.summary().loc["C10"], whole.loc["C10"], rtol=1e-6)
+
+
+def test_a_similar_fit_begins_with_the_longer_lattice_and_finds_the_same(monkeypatch):
+    model = tq.fit(measured(seed=4), discrepancy="taylor", noise_sd=NOISE_SD).model
+    shorter = AmplitudeLattice().solve([model])[0].log_evidence
+    monkeypatch.setattr("tissuq.inference.enumerators.nodes.MAX_RATIO_TO_DATA", 0.1)
+    made, lattice = [], AmplitudeLattice()
+    monkeypatch.setattr("tissuq.inference.enumerators.nodes.Lattice", lambda *args: made.append(0) or Lattice(*args))
+    evidences, counts = [], []
+    for _ in range(2):
+        evidences.append(lattice.solve([model])[0].log_evidence)
+        counts.append(len(made))
+    assert evidences == pytest.approx([shorter, shorter], abs=1e-6)
+    assert counts[1] - counts[0] == counts[0] / 2
 
 
 @pytest.mark.slow
