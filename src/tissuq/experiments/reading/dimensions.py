@@ -24,6 +24,8 @@ HOW_TO_GIVE_SECTION = (
 )
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
+BREADTHS = ("diameter",), ("width", "thickness")
+"""Sizes that say how broad a specimen is, not only how much area it has."""
 EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
 PLURALS = {"thickness": "thicknesses"}
 """Of names of sizes that do not end in s alone."""
@@ -183,6 +185,19 @@ class Dimensions:
             )
         return self._size(
             "thickness", 'to turn a force per width into a stress give the undeformed thickness (--thickness "2 mm").'
+        )
+
+    @property
+    def broad_in_words(self) -> str:
+        """That the specimen is broader than long, if its sizes say so: such specimens are rather compressed."""
+        names = next((names for names in BREADTHS if {*names, "length"} <= self.sizes.keys()), ())
+        breadth = min((self.sizes[name].value for name in names), default=0.0)
+        if not names or self.sizes["length"].unit == PIXELS.unit or breadth <= self.sizes["length"].value:
+            return ""
+        sides = " x ".join(f"{self.sizes[name].value:g}" for name in names)
+        return (
+            f"the specimen is broader ({sides} mm) than long ({self.sizes['length'].value:g} mm), as specimens for "
+            "compression are"
         )
 
     def _size(self, name: str, advice: str) -> Dimension:
