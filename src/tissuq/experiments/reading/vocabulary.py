@@ -322,13 +322,14 @@ DIMENSION_NAMES = {
         "grubość, толщина"
     ),
     "diameter": names_of(
-        "diameter, d0, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, "
+        "diameter, d0, ø, ⌀, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, "
         "średnica, диаметр"
     ),
     "length": names_of(
         "length, gauge length, gage length, l0, grip separation, grip to grip separation, distance between grips, "
-        "messlänge, anfangsmesslänge, anfangslänge, einspannlänge, probenlänge, longueur, longueur de référence, "
-        "longueur entre repères, longueur entre mors, distance entre mors, longitud, longitud de referencia, "
+        "messlänge, anfangsmesslänge, anfangslänge, ausgangslänge, einspannlänge, probenlänge, "
+        "longueur, longueur de référence, longueur entre repères, longueur entre mors, distance entre mors, "
+        "longitud, longitud de referencia, "
         "longitud entre puntos, longitud entre mordazas, distancia entre mordazas, comprimento, "
         "comprimento de referência, comprimento de medida, distância entre garras, lunghezza, "
         "lunghezza di riferimento, lunghezza tra i riferimenti, distanza tra gli afferraggi, lengte, "
