@@ -370,3 +370,13 @@ def test_diameters_and_lengths_by_the_signs_and_words_of_german_machines(tmp_pat
     data = tq.read(file)
     assert data.stretch.max() == pytest.approx(1 + 1.1 / 9.23)
     assert data.stress.max() == pytest.approx(0.22 / (np.pi / 4 * 20.61**2))
+
+
+@pytest.mark.parametrize(
+    "name", ["Proben-Nr.", "Probenbezeichnung", "Prüfling", "Nom de l'échantillon", "Nombre de la probeta"]
+)
+def test_the_specimen_is_that_of_a_line_above_the_table_in_words_of_machines(tmp_path, name):
+    file = tmp_path / "Zugversuch.csv"
+    rows = [f"{1 + 0.02 * k:.2f};{0.02 * k:.3f}".replace(".", ",") for k in range(12)]
+    file.write_text("\n".join([f"{name};L1;", "Stretch;Spannung (kPa)", *rows]))
+    assert tq.read(file).specimen == "L1"
