@@ -61,6 +61,7 @@ def test_every_base_class_has_a_group_of_its_own():
 
 
 def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(package):
+    module = {"__module__": package.__name__}
     kinds = {
         "offset": type("Offset", (Constant,), {"__module__": package.__name__}),
         "loud": type("Loud", (tq.UnknownNoise,), {"__module__": package.__name__}),
@@ -68,7 +69,7 @@ def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(pa
         "upright": type("Upright", (Uniaxial,), {"__module__": package.__name__}),
         "box": type("Box", (tq.Uniform,), {"__module__": package.__name__}),
         "pulled": type("Pulled", (ClampedBar,), {"__module__": package.__name__}),
-        "plain": type("Plain", (CardFormat,), {"__module__": package.__name__, "cards": lambda *arguments: None}),
+        "plain": type("Plain", (CardFormat,), {**module, "description": "", "cards": lambda *arguments: None}),
     }
     vars(package).update(kinds)
     assert type(discrepancy_named("offset")) is kinds["offset"]
@@ -99,6 +100,19 @@ def test_a_broken_entry_point_is_refused_with_its_name_and_package(package):
         loading_mode("broken")
     with pytest.raises(tq.ModelError, match=r"is not a subclass of .*Discrepancy"):
         discrepancy_named("broken")
+
+
+def test_a_class_that_lacks_what_lists_show_is_refused_by_what_it_lacks(package):
+    members = {
+        "__module__": package.__name__,
+        "name": "leaning",
+        "principal_stretches": lambda self, point: (point,) * 3,
+    }
+    package.leaning = type("Leaning", (tq.LoadingMode,), members)
+    with pytest.raises(tq.ModelError, match=r"another_package:leaning.*the class has no description"):
+        registry.plugins(tq.LoadingMode)
+    package.leaning.description = "pulled at an angle"
+    assert registry.plugins(tq.LoadingMode) == [package.leaning]
 
 
 def test_an_unknown_name_is_still_refused_by_the_kind_that_was_meant(package):

@@ -79,10 +79,18 @@ def plugins(base: type[T], name: str | None = None) -> list[type[T]]:
     def accept(plugin: Any, source: str) -> type[T]:
         if not (isinstance(plugin, type) and issubclass(plugin, base)):
             raise ModelError(f"{source} is not a subclass of {_origin(base)}")
+        if missing := [name for name in _required(base) if not hasattr(plugin, name)]:
+            raise ModelError(f"the class has no {' and no '.join(missing)}")
         return plugin
 
     group = getattr(base, "entry_point_group", "")
     return load_plugins(group, accept, name) if group else []
+
+
+def _required(base: type) -> list[str]:
+    """Return what every variant must have, beside its name: what the base class declares without a value."""
+    declared = [item for kind in base.__mro__ for item in vars(kind).get("__annotations__", {}).items()]
+    return [name for name, kind in declared if "ClassVar" in str(kind) and name != "name" and not hasattr(base, name)]
 
 
 def load_plugins(group: str, accept: Callable[[Any, str], T], name: str | None = None) -> list[T]:

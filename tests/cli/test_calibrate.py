@@ -69,6 +69,7 @@ def test_a_run_leaves_the_promised_files(calibrate_run):
     assert all(
         words in page
         for words in (
+            "against &#39;depth",
             "Runs that failed",
             "predicted worst from the others",
             "What the outputs depend on",

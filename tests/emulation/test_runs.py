@@ -231,6 +231,14 @@ def test_of_several_models_the_one_that_fails_is_named_and_each_gets_its_control
         failing.run({"a": 1.0}, controls)
 
 
+def test_a_model_that_asks_for_a_parameter_without_a_prior_is_told_which_there_are():
+    def force(parameters):
+        return parameters["alpha"] * DEPTH
+
+    with pytest.raises(InputError, match=r"KeyError: 'alpha' \(there are priors of C10\)"):
+        tq.calibrate(DEPTH, neo_hooke({"C10": 1.0}), force, PRIORS, runs=16)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_after_first_runs_that_all_fail_no_more_are_made(tmp_path, workers):

@@ -131,6 +131,29 @@ def test_negative_numbers_of_a_test_that_is_called_tension_are_asked_about(tmp_p
     assert tq.read(path, dimensions=SIZES, compression_positive=False).stretch.max() == 1
 
 
+DISC = "Durchmesser;20,61;mm\nProbenhöhe;9,23;mm\n"
+BLOCK = "Breite;12,0;mm\nDicke;11,0;mm\nMesslänge;9,23;mm\n"
+
+
+@pytest.mark.parametrize(("head", "area"), [(DISC, np.pi / 4 * 20.61**2), (BLOCK, 132.0)], ids=["disc", "block"])
+def test_positive_numbers_of_a_specimen_broader_than_long_are_asked_about(tmp_path, head, area):
+    path = tmp_path / "Leber.csv"
+    columns = 9.23 * (1 - COMPRESSION), -area * neo_hookean(COMPRESSION)
+    rows = [f"{d:.9f};{f:.9f}".replace(".", ",") for d, f in zip(*columns, strict=True)]
+    path.write_text("\n".join([f"{head}Weg (mm);Kraft (N)", *rows]))
+    with pytest.raises(InputError, match=r"broader \(.* than long \(9.23 mm\).*--compression-positive.*--tension-pos"):
+        tq.read(path)
+    sizes = {"length": "9.23 mm", "area": f"{area} mm2"}
+    data = tq.read(path, compression_positive=True, dimensions=sizes)
+    np.testing.assert_allclose(data.stretch, COMPRESSION, atol=1e-8)
+    np.testing.assert_allclose(data.stress, neo_hookean(COMPRESSION), atol=1e-8)
+    assert tq.read(path, compression_positive=False).stretch.max() == pytest.approx(1.3)
+    path.with_name("Zugversuch.csv").write_text(path.read_text())
+    assert tq.read(path.with_name("Zugversuch.csv")).stretch.max() == pytest.approx(1.3)
+    path.write_text(path.read_text().replace("9,23;mm", "30,0;mm"))
+    assert tq.read(path).stretch.max() > 1
+
+
 def test_what_cannot_be_turned_and_a_turn_that_is_wrong_are_refused(tmp_path):
     stress = neo_hookean(TENSION)
     with pytest.raises(InputError, match=r"turn \(--turn\) must be one of load, deformation, both"):

@@ -6,6 +6,7 @@ import pytest
 
 from tissuq import InputError
 from tissuq.experiments.reading.specimens_in_files import find_tests, read_column
+from tissuq.studies.files_of_tests import files_of
 
 ROWS = ["0.9,-3.5", "1.1,2.8", "1.2,5"]
 
@@ -23,6 +24,8 @@ def experiments_in(file, column):
 def test_files_are_specimens_and_folders_are_repeated_tests(tmp_path):
     for name in ("all/b.csv", "all/a.csv", "all/c/first.csv", "all/c/second.txt", "all/notes.md", "all/empty/x.md"):
         write(tmp_path / name)
+    for name in ("all/~$b.xlsx", "all/._a.csv", "all/c/~$second.xlsx"):  # of open workbooks, and of macOS
+        (tmp_path / name).write_bytes(b"\x05Anna\x00")
     tests = find_tests([tmp_path / "all"])
     assert {name: [file.name for file in files] for name, files in tests.items()} == {
         "a": ["a.csv"],
@@ -30,6 +33,7 @@ def test_files_are_specimens_and_folders_are_repeated_tests(tmp_path):
         "c": ["first.csv", "second.txt"],
     }
     assert list(find_tests([tmp_path / "all" / "b.csv"])) == ["b"]
+    assert [file.name for file in files_of([tmp_path / "all"])] == ["a.csv", "b.csv"]
 
 
 def test_a_column_names_specimens(tmp_path):

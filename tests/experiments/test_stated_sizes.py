@@ -345,3 +345,38 @@ def test_a_unit_stands_between_the_name_of_a_size_and_its_value(tmp_path, separa
     data = tq.read(path)
     assert data.stretch[-1] == pytest.approx(1 + 11 / 20)
     assert data.stress[-1] == pytest.approx(1.1 / 10)
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        ("Durchmesser: 20.61\nHöhe: 9.23", "in line 1 'Durchmesser: 20.61', in line 2 'Höhe: 9.23', without a unit"),
+        ("Diamètre (mm);20,61\nÉpaisseur (mm);9,23", r'along its thickness, give --length "9.23 mm" \(in line 2\)'),
+    ],
+)
+def test_a_message_about_a_missing_size_quotes_what_may_be_it(tmp_path, head, words):
+    file = tmp_path / "liver.csv"
+    rows = [f"{0.1 * k:.2f};{0.02 * k:.3f}".replace(".", ",") for k in range(12)]
+    file.write_text("\n".join([head, "Weg (mm);Kraft (N)", *rows]))
+    with pytest.raises(tq.InputError, match=words):
+        tq.read(file)
+
+
+@pytest.mark.parametrize("head", ["Ø;20,61;mm\nHöhe;9,23;mm", "Durchmesser;20,61;mm\nAusgangslänge L0;9,23;mm"])
+def test_diameters_and_lengths_by_the_signs_and_words_of_german_machines(tmp_path, head):
+    file = tmp_path / "Zugversuch.csv"
+    rows = [f"{0.1 * k:.2f};{0.02 * k:.3f}".replace(".", ",") for k in range(12)]
+    file.write_text("\n".join([head, "Weg (mm);Kraft (N)", *rows]))
+    data = tq.read(file)
+    assert data.stretch.max() == pytest.approx(1 + 1.1 / 9.23)
+    assert data.stress.max() == pytest.approx(0.22 / (np.pi / 4 * 20.61**2))
+
+
+@pytest.mark.parametrize(
+    "name", ["Proben-Nr.", "Probenbezeichnung", "Prüfling", "Nom de l'échantillon", "Nombre de la probeta"]
+)
+def test_the_specimen_is_that_of_a_line_above_the_table_in_words_of_machines(tmp_path, name):
+    file = tmp_path / "Zugversuch.csv"
+    rows = [f"{1 + 0.02 * k:.2f};{0.02 * k:.3f}".replace(".", ",") for k in range(12)]
+    file.write_text("\n".join([f"{name};L1;", "Stretch;Spannung (kPa)", *rows]))
+    assert tq.read(file).specimen == "L1"

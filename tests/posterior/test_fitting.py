@@ -259,3 +259,18 @@ def test_fewer_points_than_means_are_counted_in_rows_of_the_file():
     (correlated,) = [warning for warning in warnings if warning.code == "correlated-residuals"]
     every = int(re.search(r"every=(\d+)", str(correlated)).group(1))
     assert (every % 12, every > 24) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"discrepancy": None}, "discrepancy must be a name, such as 'auto' or 'none', .* not None"),
+        ({"material": 3}, "material must be a name, such as 'yeoh', .* not 3"),
+        ({"material": tq.materials()["yeoh"]}, r"make one of the class, Yeoh\(\.\.\.\)"),
+        ({"stable_in": None}, r"stable_in must be 'all' or names of loading modes, .* not None"),
+    ],
+    ids=["discrepancy", "number", "class", "modes"],
+)
+def test_what_is_neither_a_name_nor_an_object_is_refused_with_what_to_give(options, words):
+    with pytest.raises(tq.TissuqError, match=words):
+        tq.fit(MIXED[0], noise_sd=0.1, **({"discrepancy": "none"} | options))

@@ -91,6 +91,19 @@ def test_what_is_beyond_the_data_is_marked_and_told_once(fits, data, planar):
     assert found.is_data_calibrated.sum() == 8 - outside
 
 
+def test_beyond_the_stretches_of_a_mode_it_is_told_where_the_invariants_are_within_those_of_the_tests(data):
+    """Uniaxial compression to 0.6 has the invariants of equibiaxial tension to 1 / sqrt(0.6) = 1.29."""
+    options = {"noise_sd": 1e-5, "seed": 2}
+    tests = [
+        tq.simulate("neo-hookean", {"C10": 1e-3}, np.linspace(1, 1.4, 8), mode=mode, **options)
+        for mode in ("uniaxial", "equibiaxial")
+    ]
+    posterior = tq.fit(tests, discrepancy="taylor", noise_sd=1e-5, tolerances="as-tested")
+    within, beyond = (predicted(posterior, mode="uniaxial", stretch=[end, 1.0, 1.4]) for end in (0.6, 0.4))
+    assert "I1 and I2 are no larger beyond it than in the tests of the run" in within.warnings[0]
+    assert "is due to how the energy goes on" in beyond.warnings[0]
+
+
 def test_the_share_of_the_variance_beyond_the_data_is_that_of_the_errors_of_their_exponents(fits, monkeypatch):
     """The band is the same where these errors are taken to be their medians, and the share follows from both widths."""
     stretches = [1.2, 3.0, 4.0]

@@ -12,11 +12,11 @@ from marks import slow_but
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import engineering_stress
 from tissuq.model.discrepancy import discrepancies
+from tissuq.model.prior_draws import draw_from_prior
 from tissuq.studies.stream import RESULTS, open_pool
 from tissuq.validation.sbc import (
     SbcSettings,
     carry_out,
-    draw_from_prior,
     ecdf_band,
     probability_below,
     run_sbc,

@@ -38,6 +38,8 @@ def modes_named(names: str | Sequence[str]) -> tuple[str, ...]:
     InputError, ModelError
         When ``"all"`` is combined with other names, or there is no such mode.
     """
+    if not isinstance(names, str | Sequence):
+        raise InputError(f"stable_in must be '{ALL_MODES}' or names of loading modes, and () for none, not {names!r}.")
     requested = [names] if isinstance(names, str) else list(names)
     if ALL_MODES in requested and len(requested) > 1:
         raise InputError(f"'{ALL_MODES}' cannot be combined with other loading modes in stable_in: omit the others.")

@@ -147,7 +147,9 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     except UnreadableError:
         raise
     except Exception as error:  # a failed run is a result, which is listed
-        result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
+        is_missing = isinstance(error, KeyError) and not {*error.args} & {*dict(run.parameters)}
+        what_to_do = f" (there are priors of {', '.join(dict(run.parameters))})" * is_missing
+        result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300] + what_to_do
     else:
         result |= _checked(outputs, run)
         if not result["error"]:

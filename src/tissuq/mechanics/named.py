@@ -34,7 +34,7 @@ def material_named(material: str | Material, *, laws: bool = False) -> Material:
     Raises
     ------
     ModelError
-        When no material has that name, or a sum has a parameter twice.
+        When no material has that name, it is neither a name nor a material, or a sum has a parameter twice.
     InputError
         When a law in a file cannot be used.
 
@@ -45,6 +45,11 @@ def material_named(material: str | Material, *, laws: bool = False) -> Material:
     """
     if isinstance(material, Material):
         return material
+    if not isinstance(material, str):
+        made = f": make one of the class, {material.__name__}(...)" if isinstance(material, type) else ""
+        raise ModelError(
+            f"material must be a name, such as 'yeoh', or an object of tissuq.Material, not {material}{made}."
+        )
     names = [SUMS.get(name.strip(), name) for name in material.split("+")]
     summands = [_single(name.strip(), laws) for name in "+".join(names).split("+")]
     return MaterialSum.of(*summands) if len(summands) > 1 else summands[0]

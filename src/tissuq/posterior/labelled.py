@@ -12,11 +12,13 @@ from tissuq.assessment.modulus import derived_marginal, modulus
 from tissuq.errors import InputError
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
+from tissuq.model.prior_draws import draw_from_prior
+from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.checks import check_probability
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import LeaveOneOut, pointwise_log_likelihood, replicate_data, stride
 
-__all__ = ["labelled_arrays", "labels_of", "summaries", "summaries_in"]
+__all__ = ["labelled_arrays", "labels_of", "prior_arrays", "summaries", "summaries_in"]
 
 OF_VALUES = ("mean", "sd", "median", "hdi_low", "hdi_high")
 """Numbers of a summary that have the unit of their parameter."""
@@ -80,6 +82,28 @@ def labelled_arrays(
         ),
     }
     return groups
+
+
+def prior_arrays(model: StatisticalModel, draws: int, seed: int, unit: StressUnit) -> dict[str, LabelledGroup]:
+    """Return draws of parameters from their priors, and of the measurements: the groups ``prior`` and its predictive.
+
+    Stresses, and parameters that are stresses, are in the unit.
+    """
+    generator = np.random.default_rng([seed, 4])
+    drawn, stresses = zip(*(draw_from_prior(model, generator) for _ in range(draws)), strict=True)
+    sample = {"chain": np.arange(1), "draw": np.arange(draws)}
+    of_parameters = {}
+    for parameter in model.parameters:
+        values = np.array([[one[parameter.symbol] for one in drawn]])
+        units = unit.name if parameter.unit else "1"
+        scaled = values / (unit.to_mpa if parameter.unit else 1.0)
+        of_parameters[parameter.symbol] = (("chain", "draw"), scaled, {"units": units})
+    dimensions, point = ("chain", "draw", "measurement"), {"measurement": np.arange(model.experiment.size)}
+    stress = np.array([stresses]) / unit.to_mpa
+    return {
+        "prior": LabelledGroup(of_parameters, sample),
+        "prior_predictive": LabelledGroup({"stress": (dimensions, stress, {"units": unit.name})}, sample | point),
+    }
 
 
 def labels_of(solution: Solution, seed: int) -> dict[str, str | float]:

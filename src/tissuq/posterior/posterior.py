@@ -34,7 +34,7 @@ from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.drawn_materials import Sampling, drawn_ensemble
 from tissuq.posterior.ensemble import Ensemble
-from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries_in
+from tissuq.posterior.labelled import labelled_arrays, labels_of, prior_arrays, summaries_in
 from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.posterior.plots import PosteriorPlots
 from tissuq.posterior.solver import Solver
@@ -520,6 +520,21 @@ class Posterior(PosteriorPlots):
             When it is no unit of stress.
         """
         return tree_of(self._groups(self.unit(unit)))
+
+    def prior_predictive(self, draws: int = 500) -> xr.DataTree:
+        """Return draws from the priors and the measurements to which they lead, as ``prior`` and ``prior_predictive``.
+
+        Parameters and stresses are in the unit of the measurements, with the discrepancy and noise of the model; errors
+        of whole tests, and correlations of consecutive ones, are left out. Default priors are wide boxes about the
+        data, and so are these draws. For ArviZ beside the posterior:
+        ``posterior.data.assign(posterior.prior_predictive().children)``.
+
+        Raises
+        ------
+        ModelError
+            When the noise depends on the data (``proportional``, ``repeats``).
+        """
+        return tree_of(prior_arrays(self.model, draws, self.seed, self.unit()))
 
     def _groups(self, unit: StressUnit) -> dict[str, LabelledGroup]:
         labels = labels_of(self.solution, self.seed)

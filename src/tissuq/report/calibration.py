@@ -22,7 +22,7 @@ from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Se
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, known_number, significant
 from tissuq.report.writer import posterior_files
-from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy
+from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy, Measured
 
 __all__ = ["calibration_result"]
 
@@ -272,6 +272,7 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
     noise = ", ".join(f"{sd} ({name})" if name else str(sd) for name, sd in settings.noises.items())
     evidence = "" if calibration.log_evidence is None else f" Log evidence {calibration.log_evidence:.2f}."
     sentences = (
+        f"Read: {'; '.join(map(_read, study.data.values()))}.",
         "measured = emulator(parameters) + discrepancy(control) + noise (Kennedy & O'Hagan 2001), all Gaussian given "
         f"the parameters; noise sd {noise}.",
         f"{len(runs)} runs ({settings.design} design{refined}), {significant(float(np.median(runs.seconds)))} s each. "
@@ -298,6 +299,12 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
             "predict, export and structure take this run."
         )
     return tuple(blocks)
+
+
+def _read(data: Measured) -> str:
+    """Return what was read of a file: the columns, and how many rows over which range."""
+    ends = f"{significant(float(data.control.min()), 4)} to {significant(float(data.control.max()), 4)}"
+    return f"{len(data.control)} rows, '{data.measured_label}' against '{data.control_label}', {ends}"
 
 
 def _model_run(forward: DeckForward, names: tuple[str, ...], study: CalibrationStudy) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["computed_section", "data_section", "methods_section", "named", "subject_of"]
+__all__ = ["computed_section", "data_section", "methods_section", "named", "specimens_section", "subject_of"]
 
 LONGEST_NAME = 40
 """Letters of the names of several tests in a title; of more these are counted."""
@@ -29,10 +29,8 @@ PRIORS = (
     "energies are half-Cauchy, with the typical C10 of the data as their scale; such a posterior may have no mean or "
     "sd, so none is given."
 )
-INTRODUCTION = (
-    "The material model {material}, with the strain-energy density W = {formula} ({source}), was fitted by Bayesian "
-    "inference with tissuq {version} to {count}: {tests}."
-)
+LAW = "The material model {0.name}, with the strain-energy density W = {0.formula} ({0.source}), was fitted"
+INTRODUCTION = "{law} by Bayesian inference with tissuq {version} to {count}: {tests}."
 INTERVALS = "Posterior means, with 95 % highest-density intervals of {meaning}: {numbers}."
 WHOLE_TESTS = "Errors of whole tests were included with these standard deviations: {sizes}."
 WITHOUT_LATERAL_STRESS = (
@@ -88,6 +86,15 @@ def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Secti
     return Section("The data and what intervals include", tuple(blocks))
 
 
+def specimens_section(tests: Mapping[str, Sequence[Experiment]], model: StatisticalModel, noise_sd: object) -> Section:
+    """Return how the files of specimens were read, and as what their stress was taken: of ``model``, one of them."""
+    sources = tuple(f"**{name}**: {test.source}." for name, of_one in tests.items() for test in of_one)
+    noise = model.noise.description + f": {noise_sd}" * (not model.noise.parameters)
+    discrepancy = _discrepancy_in_words(model, model.discrepancy.name)
+    law = f"{LAW.format(model.material)} to every specimen. {discrepancy} Noise: {noise}."
+    return Section("The data and the model of every specimen", (sources, law))
+
+
 def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:
     """Return what the random errors of single measurements are taken to be."""
     noise, lag, settings = posterior.model.noise, posterior.model.fitted_errors.lag, study.settings
@@ -135,11 +142,9 @@ def _method_of(posterior: Posterior) -> str:
 def methods_section(study: SpecimenStudy) -> Section:
     """Return the text, of the discrepancy that answers: model, data, errors, priors, computation and result."""
     posterior, unit, tests = study.posteriors[study.main], study.unit, study.experiment.tests
-    material, diagnostics = posterior.model.material, posterior.diagnostics
+    diagnostics = posterior.diagnostics
     introduction = INTRODUCTION.format(
-        material=material.name,
-        formula=material.formula,
-        source=material.source,
+        law=LAW.format(posterior.model.material),
         version=version("tissuq"),
         count="a test" if len(tests) == 1 else f"{len(tests)} tests",
         tests="; ".join(tests_in_words(study.experiment)),

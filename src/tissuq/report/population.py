@@ -24,6 +24,7 @@ from tissuq.population.uses import uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
+from tissuq.report.measured import specimens_section
 from tissuq.report.population_figures import (
     Bands,
     Measured,
@@ -237,7 +238,9 @@ def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predi
     if tolerances := _tolerances(population):
         sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
         computed += (f"Errors of the specimens' own tests are included (of the first one: {sizes}).",)
-    return (*sections, Section("How to read it", (HOW_TO_READ,)), Section("How it was computed", (computed,)))
+    data = specimens_section(study.tests, next(iter(population.posteriors.values())).model, settings.noise_sd)
+    how_computed = Section("How it was computed", (computed,))
+    return (*sections, Section("How to read it", (HOW_TO_READ,)), how_computed, data)
 
 
 def _about_specimens(population: Population) -> str:

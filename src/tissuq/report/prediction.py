@@ -45,7 +45,7 @@ NOT_COMPRESSED = " No test was in compression, which counts as measured where it
 def prediction_figure(prediction: Prediction) -> Figure:
     """Return a row of panels for each stress: with the discrepancy, where it is known, and the material alone.
 
-    The stretches at which an invariant is larger than in the measurements of the run are hatched.
+    The stretches outside the range that was measured are hatched.
     """
     kinds = len(prediction.kinds)
     return _figure(prediction, 4.9 * kinds + (1.6 if kinds == 1 else 0.4), 4 if kinds > 1 else 2)
@@ -153,9 +153,16 @@ def _shares(prediction: Prediction) -> list[Number]:
         remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
         numbers.append(Number("measurements inside the band", value, remark=remark))
     extrapolated = count - int(prediction.is_calibrated.sum())
-    remark = "outside the measured range of I1 and I2" if extrapolated else "all within the measured range of I1 and I2"
+    remark = f"{'outside' if extrapolated else 'all within'} the {_measured_range(prediction)}"
     numbers.append(Number("extrapolated", f"{100 * extrapolated / count:.0f} % of the points", remark=remark))
     return numbers
+
+
+def _measured_range(prediction: Prediction) -> str:
+    """Return what says whether a state was measured: in a mode of the run its stretches, in another the invariants."""
+    controls = prediction.mode.controls
+    is_measured = len(controls) == 1 and prediction.mode in prediction.posterior.model.experiment.modes
+    return f"measured range of {f'the {controls[0].name}' if is_measured else 'I1 and I2'}"
 
 
 def _named(settings: PredictionSettings, beside: Path) -> str:
@@ -180,8 +187,8 @@ def _next_step(prediction: Prediction, run: str) -> str:
 def _caption(prediction: Prediction) -> str:
     share, deduced = f"{100 * prediction.prob:.4g} %", NOT_COMPRESSED * prediction.is_compression_deduced
     return (
-        f"Dark: {share} of the stress itself, noise off. Light: {share} of measurements of it. Hatched: an invariant "
-        f"is larger than in any measurement of the run; there bands may run out of the panel.{deduced}"
+        f"Dark: {share} of the stress itself, noise off. Light: {share} of measurements of it. Hatched: outside the "
+        f"{_measured_range(prediction)}; there bands may run out of the panel.{deduced}"
     )
 
 

@@ -252,5 +252,6 @@ def write_recipe(folder: Path, command: str, settings: BaseModel, without: froze
     import tomli_w
 
     plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
-    header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
+    again = f"tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER"
+    header = f"# Repeat this run of tissuq {version('tissuq')}: {again}\n"
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")

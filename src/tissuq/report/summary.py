@@ -46,7 +46,8 @@ STABILITY_HEADERS = [
 STABLE_MEANS = (
     "Stable means that from rest onward the greater principal stress lies along the greater stretch (Baker-Ericksen), "
     "every small change of stress does positive work (Drucker), and the engineering stress rises with the stretch. It "
-    "is checked over the stretches within which both invariants were measured, for the material together with a "
+    "is checked over the measured stretches of the modes that were measured, and in the others over those within "
+    "which both invariants were measured, for the material together with a "
     "discrepancy that is an energy; any other discrepancy does not affect stability and is left out. Lost in "
     "compression or tension: median and 95 % interval of the draws that become unstable, if stability is lost with a "
     "probability above 5 %."

@@ -52,14 +52,14 @@ def resolve(file: Path) -> Path:
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
     """Return the files that were given; of a folder those in it that may hold measurements."""
-    from tissuq.experiments.reading.specimens_in_files import SUFFIXES
+    from tissuq.experiments.reading.specimens_in_files import SUFFIXES, tables_in
 
     files: list[Path] = []
     for path in paths:
         if not path.is_dir():
             files.append(resolve(path))
             continue
-        inside = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+        inside = tables_in(path)
         if not inside:
             raise InputError(f"folder '{path}' has no files of measurements ({', '.join(SUFFIXES)}).")
         files += inside

@@ -234,7 +234,10 @@ def _prediction_warnings(
     outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
         largest = max((shares.max() for shares in extrapolated.values()), default=0.0)
+        states = measured_states(model, is_directed=posterior.solution.is_directed)
         due = f"; beyond, up to {100 * largest:.0f} % of the variance of the stress is due to how the energy goes on"
+        if states.contain(mode.paths[0].at(points)).all():
+            due = ", and I1 and I2 are no larger beyond it than in the tests of the run"
         calibrated = f"{_calibrated_in_words(posterior, mode)}{due if largest else ''}"
         texts.append(f"{outside} lie outside the measured range: {calibrated}.")
     if data is not None and not was_fitted and model.tolerances.estimand in (AS_TESTED, SPECIMEN):

@@ -147,7 +147,7 @@ class Prediction:
     def plot(self, ax: Any = None) -> Any:
         """Draw every stress with the discrepancy, where it is known, and of the material alone: a panel each.
 
-        Stretches at which an invariant is larger than in the fitted measurements are hatched.
+        Stretches outside the range that was measured are hatched.
 
         Parameters
         ----------

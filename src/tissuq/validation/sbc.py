@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from tissuq.arrays import FloatArray
-from tissuq.errors import ModelError, TissuqError
+from tissuq.errors import TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.prior_draws import draw_from_prior
 from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
@@ -34,7 +35,6 @@ __all__ = [
     "SbcSettings",
     "Task",
     "carry_out",
-    "draw_from_prior",
     "ecdf_band",
     "probabilities_of",
     "run_sbc",
@@ -114,46 +114,6 @@ class SbcSettings(SbcOptions):
         noise_sd = self.design.noise_sd if noise == "known" else noise
         law = material_named(self.material)
         return model_of(formulation, self.design.mode, self.design.stretch, noise_sd, self.chosen_priors, law)
-
-
-def draw_from_prior(model: StatisticalModel, generator: np.random.Generator) -> tuple[dict[str, float], FloatArray]:
-    """Return values of all parameters, drawn from their priors, and the measured stress (n,), MPa, that they lead to.
-
-    An amplitude of which the drawn member of an energy discrepancy has no block is zero.
-
-    Raises
-    ------
-    ModelError
-        When the noise depends on the data.
-    """
-    if model.noise.depends_on_level or model.noise.shares_discrepancy:
-        raise ModelError(f"noise '{model.noise.name}' depends on the data, so data cannot be drawn from the prior.")
-    values = {symbol: float(prior.quantile(generator.uniform())) for symbol, prior in model.priors.items()}
-    states = model.experiment.states
-    design = model.basis(states, [values[symbol] for symbol in model.bent_symbols])
-    stress = design @ [values[symbol] for symbol in model.column_symbols]
-    if model.energy_symbols:
-        stress = stress + _energy_stress(model, values, generator)
-    if model.is_correlated:
-        covariance = model.correlated_variance(values) * model.correlation(states, states, values)
-        sizes, vectors = np.linalg.eigh(covariance)
-        stress = stress + vectors @ (np.sqrt(np.maximum(sizes, 0.0)) * generator.standard_normal(len(states)))
-    return values, stress + np.sqrt(model.white_variance(values)) * generator.standard_normal(len(states))
-
-
-def _energy_stress(model: StatisticalModel, values: dict[str, float], generator: np.random.Generator) -> FloatArray:
-    """Draw a member and its weights; set the amplitudes that it has not to zero."""
-    members = model.energy_members
-    number = int(generator.choice(len(members), p=[candidate.probability for candidate in members]))
-    member = members[number]
-    for block, symbol in enumerate(model.energy_symbols):
-        if block not in member.amplitude_indices:
-            values[symbol] = 0.0
-    stress = np.zeros(model.experiment.size)
-    features = member.stress_features(model.experiment.states)
-    for block, terms in zip(member.amplitude_indices, features, strict=True):
-        stress += values[model.energy_symbols[block]] * terms @ generator.standard_normal(terms.shape[1])
-    return stress
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ HOW_TO_GIVE_SECTION = (
 )
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
+BREADTHS = ("diameter",), ("width", "thickness")
+"""Sizes that say how broad a specimen is, not only how much area it has."""
 EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
 PLURALS = {"thickness": "thicknesses"}
 """Of names of sizes that do not end in s alone."""
@@ -42,7 +44,8 @@ class Dimension:
 class Dimensions:
     """The dimensions of a specimen.
 
-    Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user;
+    Those that the user gives, what the file states in two ways, other sizes in it, what it states without a unit, and
+    where it differs from the user;
     ``divide_forces`` says that the cross-section is needed, beside whatever else is; ``averages`` of which measurements
     a size is the mean, and ``is_one_of_several`` that the table holds several tests;
     ``open_height`` asks which side is the height, and ``axial_stretch`` is that at which a tube is held, in every row.
@@ -53,6 +56,7 @@ class Dimensions:
     set_by_user: frozenset[str]
     ambiguous: Mapping[str, str]
     further_sizes: tuple[StatedSize, ...] = ()
+    without_unit: tuple[str, ...] = ()
     contradictions: tuple[str, ...] = ()
     divide_forces: bool = False
     averages: tuple[str, ...] = ()
@@ -185,6 +189,19 @@ class Dimensions:
             "thickness", 'to turn a force per width into a stress give the undeformed thickness (--thickness "2 mm").'
         )
 
+    @property
+    def broad_in_words(self) -> str:
+        """That the specimen is broader than long, if its sizes say so: such specimens are rather compressed."""
+        names = next((names for names in BREADTHS if {*names, "length"} <= self.sizes.keys()), ())
+        breadth = min((self.sizes[name].value for name in names), default=0.0)
+        if not names or self.sizes["length"].unit == PIXELS.unit or breadth <= self.sizes["length"].value:
+            return ""
+        sides = " x ".join(f"{self.sizes[name].value:g}" for name in names)
+        return (
+            f"the specimen is broader ({sides} mm) than long ({self.sizes['length'].value:g} mm), as specimens for "
+            "compression are"
+        )
+
     def _size(self, name: str, advice: str) -> Dimension:
         """Return a size that must be known, and be stated once."""
         self._refuse_open_height(name)
@@ -218,6 +235,11 @@ class Dimensions:
     def _others(self, kind: Quantity, *names: str, default: str = "None is recognised in the file.") -> str:
         """Return what other sizes the file states, and the options that say what they are."""
         sizes = [size for size in self.further_sizes if size.kind is kind][:SHOWN]
+        if not sizes and "length" in names and {"diameter", "thickness"} <= self.sizes.keys():
+            size = self.sizes["thickness"]
+            return f'If it was loaded along its thickness, give --length "{size.value:g} mm" ({size.source}).'
+        if not sizes and default and self.without_unit:
+            return f"The file says {', '.join(self.without_unit[:SHOWN])}, without a unit: give sizes with theirs."
         if not sizes:
             return default
         said = ", ".join(f"{size.source} '{size.text}'" for size in sizes)

@@ -16,7 +16,7 @@ from tissuq.experiments.reading.headings import dimensions_named, heading, on_ax
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.side_by_side import TestBeside
 from tissuq.experiments.reading.stated_mode import direction_of
-from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
+from tissuq.experiments.reading.stated_sizes import StatedSize, sizes_without_unit, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
 from tissuq.experiments.units import FORCE, LENGTH, PIXELS
@@ -83,6 +83,7 @@ def dimensions_of(
         frozenset(texts),
         ambiguous,
         tuple(unnamed),
+        sizes_without_unit(table),
         averages=tuple(averages),
         is_one_of_several=test is not None,
     )

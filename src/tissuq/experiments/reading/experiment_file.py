@@ -197,7 +197,7 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     compression_positive : bool, optional
         Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
         displacements that are positive, too. Without it compression is negative, and asked about where a name says
-        compression and the numbers are positive.
+        compression, or the specimen is broader than long, and the numbers are positive.
     turn : str, optional
         ``load``, ``deformation`` or ``both``: which signs are changed, as of a load cell that counts tension as
         negative. For all loading modes.
@@ -330,7 +330,8 @@ def read_rows(
         measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
     direction = direction_of(*(text for _, text in table.head), *names)
-    recorded = with_signs(measured, choices, options, direction)
+    shape = dimensions.broad_in_words if mode == Uniaxial() else ""
+    recorded = with_signs(measured, choices, options, direction, shape)
     reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
     cycles = find_cycles(table, recorded.course, reference)
     used = recorded.of_cycle(cycles, options.get("cycle"), options.get("branch"))

@@ -34,19 +34,19 @@ NOTABLE_SHARE = 0.1
 
 
 def with_signs(
-    measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions, direction: str
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], options: ReadingOptions, direction: str, shape: str = ""
 ) -> MeasuredRows:
     """Return the rows with lengthening and tension positive: some signs of the file turned.
 
     An option says whether the file counts compression as positive, and then the rows tell what is turned; or another
     one what is, whatever the rows tell. The direction is that of the load as names say it: compression, tension or an
-    empty text.
+    empty text. The shape is that of a specimen which is rather compressed than pulled, in words, or an empty text.
 
     Raises
     ------
     InputError
-        When what is asked for has no meaning for the columns, or would change nothing, or a name says compression and
-        nobody says its sign.
+        When what is asked for has no meaning for the columns, or would change nothing, or a name or the shape of the
+        specimen says compression and nobody says its sign.
     """
     compression_positive, turn = options.get("compression_positive"), options.get("turn")
     if turn is not None:
@@ -57,7 +57,7 @@ def with_signs(
             raise InputError(f"compression_positive=True (--compression-positive) has no meaning for a {what}.")
         return measured
     if compression_positive is None:
-        _check_names(measured, choices, direction)
+        _check_names(measured, choices, direction, shape)
         return measured
     if not compression_positive:
         strain, stress = measured.stretch - 1, measured.stress
@@ -120,8 +120,8 @@ def _of_other_sign(stretch: Column, choice: ColumnChoice) -> Column:
     return stretch if measure.strain is None else measure.converted(-measure.strain(stretch), is_shear=False)[0]
 
 
-def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direction: str) -> None:
-    """Refuse positive numbers in columns whose names say compression, and of a test whose name does."""
+def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direction: str, shape: str) -> None:
+    """Refuse positive numbers in columns whose names say compression, and of a test whose name or specimen does."""
     for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         furthest = int(np.argmax(np.abs(stretch - 1)))
         for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
@@ -134,9 +134,10 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
     (choice, *_), strain, stress = choices, measured.stretch[0] - 1, measured.stress[0]
     is_of_sign = choice.measure in ("strain", "displacement")
     is_all_positive = strain.min() > -NEGLIGIBLE_STRAIN * strain.max() and float((strain * stress).sum()) > 0
-    if direction == "compression" and is_of_sign and is_all_positive:
+    why = {"compression": "a name says that this is compression", "": shape}.get(direction, "")
+    if why and is_of_sign and is_all_positive:
         raise InputError(
-            f"{measured.table.file}: a name says that this is compression, and strains and loads are positive. If the "
+            f"{measured.table.file}: {why}, and strains and loads are positive. If the "
             "machine counts compression as positive, give compression_positive=True (--compression-positive); if it "
             "is tension, compression_positive=False (--tension-positive)."
         )

@@ -30,10 +30,13 @@ __all__ = [
     "of_specimen",
     "read_column",
     "read_covariates",
+    "tables_in",
 ]
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet", ".json")
 """Of files in a folder that may hold measurements."""
+BESIDE_TABLES = ("~$", "._", ".~")
+"""How names of files begin that are there while a workbook is open, or that macOS leaves on other disks."""
 
 
 def find_tests(
@@ -100,15 +103,17 @@ def of_specimen(reading: Reading, specimen: str) -> Reading:
 
 def _in_folder(folder: Path) -> dict[Path, list[Path]]:
     """Return the files of every specimen in a folder, by the file or the folder that names it."""
-    folders = {child: _tables(child) for child in folder.iterdir() if child.is_dir()}
-    sources = {child: files for child, files in folders.items() if files} | {file: [file] for file in _tables(folder)}
+    folders = {child: tables_in(child) for child in folder.iterdir() if child.is_dir()}
+    sources = {child: files for child, files in folders.items() if files} | {file: [file] for file in tables_in(folder)}
     if not sources:
         raise InputError(f"folder '{folder}' holds no files that end in {', '.join(SUFFIXES)}.")
     return dict(sorted(sources.items()))
 
 
-def _tables(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+def tables_in(folder: Path) -> list[Path]:
+    """Return the files in a folder that may hold measurements, without those that Excel and macOS put beside them."""
+    files = (file for file in folder.iterdir() if not file.name.startswith(BESIDE_TABLES))
+    return sorted(file for file in files if file.suffix.lower() in SUFFIXES and file.is_file())
 
 
 @dataclass(frozen=True, eq=False)

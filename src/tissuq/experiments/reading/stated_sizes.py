@@ -17,7 +17,7 @@ from tissuq.experiments.reading.table import Table, padded
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import AREA, LENGTH, Quantity, looks_like_unit
 
-__all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "stated_sizes"]
+__all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "sizes_without_unit", "stated_sizes"]
 
 UNIT_ASSUMED = "as of displacements)"
 """What follows the unit of a size that a table of specimens states without one."""
@@ -146,16 +146,32 @@ def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
                 are_measured_again = is_of_one and not test and not _are_named(values, table)
                 yield from _of_several(name, values, test, source, are_measured_again=are_measured_again)
             continue
-        cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
-        statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
-        words = list(_words(statements))
-        pairs = zip(words, words[1:], [*words[2:], ("", "")], strict=False)
         clear = [
             size
-            for (name, measurement), (number, _), (unit, _) in pairs
+            for (name, measurement), (number, _), (unit, _) in _statements(text, table.separator)
             for size in _of_words(name, number, unit, source, measurement if is_of_one or test else "")
         ]
         yield from clear if clear else _among_words(text, source)
+
+
+def sizes_without_unit(table: Table) -> tuple[str, ...]:
+    """Return what lines above the table state of sizes by name and number alone, and where."""
+    return tuple(
+        f"in line {line} '{name}: {number}'"
+        for line, text in table.head
+        for (name, _), (number, _), (unit, _) in _statements(text.lstrip("# "), table.separator)
+        if dimensions_named(heading(name).quantity, is_cylinder=True)
+        and NUMBER.fullmatch(number)
+        and not _of_words(name, number, unit, "", "")
+    )
+
+
+def _statements(text: str, separator: str) -> Iterator[tuple[tuple[str, str], ...]]:
+    """Yield consecutive words of a line, three at a time: the name of a size, its number, and its unit may be these."""
+    cells = [text] if separator == WHITESPACE else split(text, separator)
+    statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
+    words = list(_words(statements))
+    yield from zip(words, words[1:], [*words[2:], ("", "")], strict=False)
 
 
 def _words(statements: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -292,10 +292,11 @@ SET_NAMES = names_of("setname, set name, set")
 
 
 SPECIMEN_NAME = re.compile(
-    r"(specimen|sample|probe|proben?körper|replicate|replikat|donor|subject|patient|animal|tier|éprouvette|échantillon|"
+    r"(specimen|sample|proben?|proben?körper|prüfling|replicate|replikat|donor|subject|patient|animal|tier|éprouvette|échantillon|"
     r"probeta|muestra|provino|campione|образ[её]ц|проба|пациент|试样|試験片|样品|样本)s?"
-    r"( ?(id|no\.?|nr\.?|n°|#|№|number|nummer|name|label|bezeichnung|编号|番号))?|"
-    r"номер (образца|пробы)|№ образца"
+    r"([ -]?(id|no\.?|nr\.?|n°|#|№|number|nummer|name|label|bezeichnung|编号|番号))?|"
+    r"(nom|nombre|nome) (de l'|de la |del |della |da |do )?(éprouvette|échantillon|probeta|muestra|provino|campione|"
+    r"amostra)|номер (образца|пробы)|№ образца"
 )
 """Names of a column that tells which specimen a row is of."""
 
@@ -322,13 +323,14 @@ DIMENSION_NAMES = {
         "grubość, толщина"
     ),
     "diameter": names_of(
-        "diameter, d0, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, "
+        "diameter, d0, ø, ⌀, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, "
         "średnica, диаметр"
     ),
     "length": names_of(
         "length, gauge length, gage length, l0, grip separation, grip to grip separation, distance between grips, "
-        "messlänge, anfangsmesslänge, anfangslänge, einspannlänge, probenlänge, longueur, longueur de référence, "
-        "longueur entre repères, longueur entre mors, distance entre mors, longitud, longitud de referencia, "
+        "messlänge, anfangsmesslänge, anfangslänge, ausgangslänge, einspannlänge, probenlänge, "
+        "longueur, longueur de référence, longueur entre repères, longueur entre mors, distance entre mors, "
+        "longitud, longitud de referencia, "
         "longitud entre puntos, longitud entre mordazas, distancia entre mordazas, comprimento, "
         "comprimento de referência, comprimento de medida, distância entre garras, lunghezza, "
         "lunghezza di riferimento, lunghezza tra i riferimenti, distanza tra gli afferraggi, lengte, "

@@ -171,9 +171,10 @@ class _Integration:
         """Return the posterior's log density (B, N) in the coordinates of the warp; bounds count where it matters."""
         assert self.warp is not None  # noqa: S101 (only called once it is there)
         h, log_density = self.warp.parameters(u)
-        gaussians = self.conditional(h)
-        ceiling = _ceiling(self.conditional, gaussians)
-        value = gaussians.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
+        with np.errstate(over="ignore", invalid="ignore"):  # where a parameter runs to infinity nothing is probable
+            gaussians = self.conditional(h)
+            ceiling = _ceiling(self.conditional, gaussians)
+            value = gaussians.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
         is_exact = np.zeros(value.shape, dtype=bool)
         for margin in (0.0, IRRELEVANT_LOG_DROP):  # the best ones first, which tell what matters

@@ -355,10 +355,15 @@ def discrepancy_named(discrepancy: str | Discrepancy) -> Discrepancy:
     Raises
     ------
     ModelError
-        When no discrepancy has that name.
+        When no discrepancy has that name, or it is neither a name nor a discrepancy.
     """
     if isinstance(discrepancy, Discrepancy):
         return discrepancy
+    if not isinstance(discrepancy, str):
+        raise ModelError(
+            f"discrepancy must be a name, such as 'auto' or 'none', or an object of tissuq.Discrepancy, not "
+            f"{discrepancy!r}."
+        )
     return _energy_sum(discrepancy) or find(Discrepancy, "discrepancy", discrepancy, ModelError)()
 
 

@@ -1,0 +1,32 @@
+"""What pages say of the data: how every file was read, and as what the stress was taken."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.report.measured import specimens_section
+
+
+@pytest.mark.parametrize(
+    ("discrepancy", "noise_sd", "words"),
+    [
+        ("none", 1e-5, "the material is right. Noise: known standard deviation: 1e-05."),
+        ("gp", "unknown", "The discrepancy is c^2 exp(-(l - l')^2 / (2 psi^2)) ('gp' of tissuq"),
+    ],
+)
+def test_a_page_of_specimens_says_how_they_were_read_and_what_was_fitted(tmp_path, discrepancy, noise_sd, words):
+    tests = {}
+    for name in ("L1", "L2"):
+        path = tmp_path / f"{name}.csv"
+        stretch = np.linspace(1, 1.3, 8)
+        rows = [f"{a:.4f},{1e3 * b:.5f}" for a, b in zip(stretch, stretch - stretch**-2, strict=True)]
+        path.write_text("\n".join(["stretch,stress (kPa)", *rows]))
+        tests[name] = [tq.read(path)]
+    model = tq.fit(tests["L1"], discrepancy=discrepancy, noise_sd=noise_sd).model
+    sources, law = specimens_section(tests, model, noise_sd).blocks
+    assert [source.partition(": ")[0] for source in sources] == ["**L1**", "**L2**"]
+    assert "engineering stress from column 'stress (kPa)' in kPa" in sources[1]
+    assert "W = C10 (I1 - 3) (Treloar 1943), was fitted to every specimen." in law
+    assert words in law
