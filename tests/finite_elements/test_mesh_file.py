@@ -286,6 +286,14 @@ def test_a_rim_that_is_held_may_be_of_the_set_that_a_sphere_is_pressed_on_in_its
         BodyFromFile(file, **options)
 
 
+def test_a_sphere_that_comes_to_no_point_is_refused(tmp_path):
+    """A mesh that does not lie around the axis: Newton's method had nothing to converge to."""
+    cube = fem.Cube(n=3)
+    meshio.Mesh(cube.points + np.array([5.0, 0, 5.0]), [("hexahedron", cube.cells)]).write(tmp_path / "off.vtu")
+    with pytest.raises(InputError, match="comes to no point of the set 'ymax': a sphere's centre is where"):
+        BodyFromFile(str(tmp_path / "off.vtu"), {"ymin": "xyz"}, press="ymax", distance=-0.1, tip_radius=1.0)
+
+
 @pytest.mark.parametrize(
     ("name", "watch", "reason"),
     [

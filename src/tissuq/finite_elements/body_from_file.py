@@ -253,6 +253,11 @@ class BodyFromFile(Case):
         across = np.linalg.norm(np.delete(mesh.points, AXIAL, axis=1), axis=1)
         behind = tip.radius - np.sqrt(np.maximum(tip.radius**2 - across**2, 0)) if np.isfinite(tip.radius) else 0.0
         in_reach = tip.points & (begun + behind < self.travel) & (across <= tip.radius)
+        if not in_reach.any():
+            raise InputError(
+                f"the tip comes to no point of the set '{self.press}': a sphere's centre is where the coordinates "
+                f"across {self.axis} are zero. Move the mesh there, or give a longer distance or a larger radius."
+            )
         if (in_reach & supports.fixed[:, AXIAL]).any():
             raise InputError(f"points of the set '{self.press}' that the tip comes to are held along {self.axis}.")
 
