@@ -193,3 +193,28 @@ def test_the_same_call_goes_on_and_another_model_is_refused(found, block, tmp_pa
         assert done == [is_new] * 8
     with pytest.raises(tq.InputError, match="another forward model"):
         tq.calibrate(DEPTH, measured, replace(block, factor=-2.0), SOFT, runs=8, **few)
+
+
+def test_quantities_that_the_model_writes_at_other_times_than_the_control_are_paired_by_time(tmp_path):
+    """A block between plates without friction, against the closed form: P = 2 C10 (l - l^-2).
+
+    Stress and strain have no row at rest, which displacements are given; and the function has every second increment.
+    """
+    deck, lines = write_block(tmp_path / "block.inp"), ["*NODE PRINT, NSET=BULGE", "U"]
+    text = deck.read_text().replace("BASE, 1, 3", "BASE, 3, 3").replace("TOP, 1, 2\n", "")
+    deck.write_text(text.replace("\n".join(lines), "\n".join([*lines, "*EL PRINT, ELSET=BLOCK", "S, E"])))
+    (tmp_path / "results.py").write_text(
+        "import re\n\n\ndef force(folder):\n"
+        "    text = (folder / 'block.dat').read_text()\n"
+        "    rows = re.findall(r'set TOP and time +([^ ]+)\\n\\n +[^ ]+ +[^ ]+ +([^ ]+)\\n', text)\n"
+        "    return [0.0, *(float(at) for at, _ in rows[1::2])], [0.0, *(float(force) for _, force in rows[1::2])]\n"
+    )
+    stretch = np.array([0.95, 0.85, 0.75])
+    engineering = 2 * 0.0005 * (stretch - stretch**-2)
+    expected = {"S33@BLOCK": engineering * stretch, "E33@BLOCK": 0.5 * (stretch**2 - 1)}
+    expected[f"{tmp_path / 'results.py'}:force"] = engineering
+    for number, (quantity, values) in enumerate(expected.items()):
+        model = tq.DeckForward(deck, "TISSUE", "neo-hookean", quantity, (0.7, 1.2), along="U3@TOP", along_factor=-1)
+        (tmp_path / str(number)).mkdir()
+        computed = model.prepared_in(tmp_path / str(number)).run({"C10": 0.0005}, 1 - stretch)
+        assert computed == pytest.approx(values, rel=2e-3)

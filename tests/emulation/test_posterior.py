@@ -460,3 +460,12 @@ def test_a_posterior_beyond_all_runs_is_told_as_such_and_not_as_the_bound_of_a_p
     found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.LogNormal(2.0, 0.05)}, noise_sd=0.02, runs=6)
     assert any("lies beyond the runs of the model in C10 (lower)" in text for text in found.warnings)
     assert not any("bound of the prior" in text for text in found.warnings)
+
+
+def test_an_emulator_of_narrower_priors_is_told_where_it_extrapolates():
+    """Runs with C10 up to 1, and a posterior at 2.5 of a prior up to 5: nothing was said."""
+    emulator = emulate(designed(neo_hooke, {"C10": tq.Uniform(0.2, 1.0)}, 8), DEPTH)
+    for C10, is_told in ((2.5, True), (0.7, False)):
+        data = measured(neo_hooke, {"C10": C10}, 0.02)
+        found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, noise_sd=0.02, emulator=emulator)
+        assert any("lies beyond the runs of the model in C10 (upper)" in text for text in found.warnings) == is_told

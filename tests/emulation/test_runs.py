@@ -1,6 +1,9 @@
 """Forward models as users give them, and their runs: kept, gone on with, and told where they fail."""
 
 import json
+import sys
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pytest
@@ -45,6 +48,69 @@ def test_a_function_in_a_file_is_run_from_there(tmp_path):
     before = forward.identity
     file.write_text("def force(parameters, depth):\n    return 2 * parameters['k'] * depth\n")
     assert forward.identity != before
+
+
+class Scaled:
+    def __init__(self, factor, area=1.0):
+        self.factor, self.area = factor, np.array([area])
+
+    def __call__(self, parameters, depth):
+        return self.factor * self.area[0] * parameters["C10"] * depth
+
+    def force(self, parameters, depth):
+        return self(parameters, depth)
+
+
+@dataclass(frozen=True, slots=True)
+class Slotted:
+    factor: float
+
+    def __call__(self, parameters, depth):
+        return self.factor * parameters["C10"] * depth
+
+
+def scaled(parameters, depth, factor=1.0):
+    return factor * parameters["C10"] * depth
+
+
+FACTOR = 2.0
+
+
+def of_the_module(parameters, depth):
+    return [part + 0.0 for part in within(parameters, depth)]
+
+
+def within(parameters, depth):
+    return FACTOR * parameters["C10"] * depth
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        Scaled,
+        Slotted,
+        lambda factor: Scaled(1.0, area=factor),
+        lambda factor: Scaled(factor).force,
+        lambda factor: partial(scaled, factor=factor),
+        lambda factor: lambda parameters, depth: scaled(parameters, depth, factor),
+        lambda factor: lambda parameters, depth, factor=factor: scaled(parameters, depth, factor),
+    ],
+)
+def test_the_runs_of_a_function_with_other_values_around_it_are_not_taken(made, tmp_path):
+    """Of the model with half the stiffness; the parameter was that of the runs in the folder, twice too small."""
+    options = {"noise_sd": 0.01, "runs": 8, "folder": tmp_path / "runs"}
+    measured = 2 * DEPTH
+    found = [tq.calibrate(DEPTH, measured, made(2.0), PRIORS, **options) for _ in range(2)]
+    assert found[0].marginals["C10"].mean == found[1].marginals["C10"].mean
+    with pytest.raises(InputError, match="another forward model"):
+        tq.calibrate(DEPTH, measured, made(1.0), PRIORS, **options)
+
+
+def test_the_values_of_the_module_are_part_of_a_function(monkeypatch):
+    before = as_forward(of_the_module).identity
+    assert as_forward(of_the_module).identity == before
+    monkeypatch.setattr(sys.modules[__name__], "FACTOR", 3.0)
+    assert as_forward(of_the_module).identity != before
 
 
 @pytest.mark.parametrize(

@@ -230,6 +230,31 @@ def test_groups_of_gmsh_are_sets(tmp_path):
     assert (sets["base"].tolist(), sets["body"].tolist()) == ([0, 1], [0, 1, 2, 3])
 
 
+def test_a_cell_of_two_physical_groups_bears_its_force_once(tmp_path):
+    """Version 2 of Gmsh's format has such a cell twice; the force is that of uniaxial tension."""
+    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    text = '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 "inner"\n2 2 "body"\n$EndPhysicalNames\n'
+    text += "$Nodes\n4\n" + "".join(f"{n} {x} {y} {z}\n" for n, (x, y, z) in enumerate(points, 1)) + "$EndNodes\n"
+    text += "$Elements\n2\n1 3 2 1 1 1 2 3 4\n2 3 2 2 1 1 2 3 4\n$EndElements\n"
+    (tmp_path / "disc.msh").write_text(text, encoding="utf-8")
+    hold = {"xmin": "x", "ymin": "y"}
+    disc = BodyFromFile(str(tmp_path / "disc.msh"), hold, move="ymax", distance=0.3, shape="axisymmetric")
+    found = respond(disc, material_named("neo-hookean"), [0.0005], steps=1)
+    assert found.force[-1] == pytest.approx(np.pi * 2 * 0.0005 * (1.3 - 1.3**-2), rel=1e-3)
+    assert set(read_mesh(tmp_path / "disc.msh").sets) >= {"inner", "body"}
+
+
+def test_parts_that_only_touch_and_parts_that_are_free_are_refused(tmp_path):
+    cube = fem.Cube(n=3)
+    hold = {"xmin": "x", "ymin": "y", "zmin": "z"}
+    for gap, reason in ((0.0, r"share no points \(9 places, the first at x, y, z = 1, 0, 0\)"), (0.5, "its 2 parts")):
+        points = np.concatenate([cube.points, cube.points + np.array([1 + gap, 0, 0])])
+        cells = np.concatenate([cube.cells, cube.cells + len(cube.points)])
+        meshio.Mesh(points, [("hexahedron", cells)]).write(tmp_path / "two.vtu")
+        with pytest.raises(InputError, match=reason):
+            BodyFromFile(str(tmp_path / "two.vtu"), hold, move="ymax", distance=0.1)
+
+
 @pytest.mark.parametrize(
     ("name", "options", "reason"),
     [
@@ -259,6 +284,14 @@ def test_a_rim_that_is_held_may_be_of_the_set_that_a_sphere_is_pressed_on_in_its
     assert BodyFromFile(file, tip_radius=1.0, **options).supports(_meshes()["quad"].points).load.radius == 1.0
     with pytest.raises(InputError, match="are held along y"):
         BodyFromFile(file, **options)
+
+
+def test_a_sphere_that_comes_to_no_point_is_refused(tmp_path):
+    """A mesh that does not lie around the axis: Newton's method had nothing to converge to."""
+    cube = fem.Cube(n=3)
+    meshio.Mesh(cube.points + np.array([5.0, 0, 5.0]), [("hexahedron", cube.cells)]).write(tmp_path / "off.vtu")
+    with pytest.raises(InputError, match="comes to no point of the set 'ymax': a sphere's centre is where"):
+        BodyFromFile(str(tmp_path / "off.vtu"), {"ymin": "xyz"}, press="ymax", distance=-0.1, tip_radius=1.0)
 
 
 @pytest.mark.parametrize(

@@ -176,6 +176,22 @@ def test_a_law_of_ones_own_is_given_and_never_run(tmp_path):
     same(before.summary(), after.summary())
 
 
+def test_a_law_that_was_changed_since_the_fit_is_refused(tmp_path):
+    """Twice the stress with the same parameters: predictions were twice what was measured."""
+
+    def written(factor, growth=1.0):
+        def own_law(I1, I2, mu, b=EXPONENT):
+            return factor * mu / (2 * b * growth) * expm1(growth * b * (I1 - 3))
+
+        return tq.FunctionLaw(own_law)
+
+    tq.fit(measured(), material=written(1.0), discrepancy="none", noise_sd=0.05).save(tmp_path / "p.nc")
+    for changed in (written(2.0), written(1.0, growth=1.1)):
+        with pytest.raises(tq.InputError, match="'own_law' has other stresses than when this posterior was fitted"):
+            tq.load(tmp_path / "p.nc", material=changed)
+    tq.load(tmp_path / "p.nc", material=written(1.0))
+
+
 def test_a_damaged_or_foreign_file_is_said(tmp_path):
     path = tmp_path / "p.nc"
     with pytest.raises(tq.InputError, match="there is no posterior"):

@@ -26,6 +26,7 @@ from tissuq.decks.model_run import (
     sets_of,
 )
 from tissuq.decks.quantity import Component, Curve
+from tissuq.decks.result_file import SAME_TIME
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material, points_of_range
 from tissuq.errors import ConvergenceError, InputError
@@ -51,7 +52,7 @@ class DeckForward(Forward):
     """A deck of which one material's card follows the parameters, as `tissuq ensemble` runs it.
 
     Its output at a control is the quantity there: its curve over the time of the model, or over another quantity, from
-    increment to increment (monotone cubics; forces and displacements begin at zero).
+    increment to increment (monotone cubics; all but functions begin at zero).
 
     Parameters
     ----------
@@ -259,9 +260,8 @@ class DeckForward(Forward):
             self._from_rest(kind, Curve(*map(np.asarray, curves.get(kind.name, ([], [])))))
             for kind in (self.measured[name], *self.quantities[len(self.measured) :])
         )
-        count = min(len(curve.times) for curve in (quantity, *controls))
-        along = self.along_factor * (controls[0].values if controls else quantity.times)[:count]
-        values = self.factors[name] * quantity.values[:count]
+        quantity, along = _paired(quantity, controls[0]) if controls else (quantity, quantity.times)
+        along, values, count = self.along_factor * along, self.factors[name] * quantity.values, len(along)
         sign = -1.0 if count > 1 and along[-1] < along[0] else 1.0  # a control that falls is looked at from behind
         along, control = sign * along, sign * control
         reached = float(along[-1]) if count else 0.0
@@ -282,10 +282,19 @@ class DeckForward(Forward):
     @staticmethod
     def _from_rest(quantity: Quantity, curve: Curve) -> Curve:
         """Return a curve with its beginning at rest, where that is known."""
-        is_known = isinstance(quantity, Component) and quantity.kind in ("U", "RF")
-        if not is_known or not len(curve.times) or curve.times[0] <= 0:
+        if not isinstance(quantity, Component) or not len(curve.times) or curve.times[0] <= 0:
             return curve
         return Curve(np.concatenate([[0.0], curve.times]), np.concatenate([[0.0], curve.values]))
+
+
+def _paired(quantity: Curve, control: Curve) -> tuple[Curve, FloatArray]:
+    """Return a quantity at its times that the control has, too, and the control then: both may have others."""
+    if not len(control.times):
+        return Curve(control.times, control.values), control.values
+    first, last = control.times[0] * (1 - SAME_TIME), control.times[-1] * (1 + SAME_TIME)
+    is_within = (quantity.times >= first) & (quantity.times <= last)
+    times, values = quantity.times[is_within], quantity.values[is_within]
+    return Curve(times, values), np.interp(times, control.times, control.values)
 
 
 def units_of(cards: CardSettings) -> dict[str, str]:

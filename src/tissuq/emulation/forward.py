@@ -7,7 +7,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from hashlib import sha256
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from tissuq.arrays import FloatArray
+from tissuq.emulation.function_digest import function_digest
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.mechanics.user_law import UserCode
 
@@ -90,11 +90,7 @@ class CallableForward(Forward):
     @property
     def identity(self) -> str:
         name = getattr(self.function, "__qualname__", type(self.function).__qualname__)
-        try:
-            text = inspect.getsource(self.function)
-        except (OSError, TypeError):
-            text = ""
-        return f"{getattr(self.function, '__module__', '')}.{name} {sha256(text.encode()).hexdigest()[:16]}"
+        return f"{getattr(self.function, '__module__', '')}.{name} {function_digest(self.function)}"
 
 
 @dataclass(frozen=True)
@@ -112,7 +108,9 @@ class FileForward(Forward):
     @property
     def identity(self) -> str:
         code = UserCode.named(self.location)
-        return f"{code.path.name}:{code.name} {code.digest}" if code else self.location
+        if code is None:
+            return f"{self.location} {function_digest(_function_at(self.location))}"
+        return f"{code.path.name}:{code.name} {code.digest}"
 
     @property
     def file(self) -> Path | None:

@@ -41,6 +41,8 @@ MAX_RMS_STANDARDISED = 1.5
 EDGE_WIDTH, MAX_EDGE_PROBABILITY = 0.01, 0.02
 """Width of an edge of the run plan, as a share of its own, and the largest posterior probability there without a
 warning; beyond the runs, by how much it may exceed that of the prior, from which few runs leave out its ends."""
+MAX_LEFT_OUT = 0.25
+"""Largest probability of a prior beyond either end of runs that were planned for it, be they ever so few."""
 PRIOR_POINTS = 4096
 """Equally probable values of a prior by which its probability beyond the runs is counted."""
 MIN_MISFIT_PROBABILITY = 1e-4
@@ -133,9 +135,9 @@ def calibration_warnings(
     at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
         yield ResultWarning(
-            f"the posterior lies beyond the runs of the model in {_listed(beyond_runs)}, which lie where its prior "
-            "is: the emulator extrapolates, or the prior contradicts the measurements. Let runs be placed where the "
-            "posterior is (refine).",
+            f"the posterior lies beyond the runs of the model in {_listed(beyond_runs)}: the emulator extrapolates "
+            "there, or the prior contradicts the measurements. Let runs be placed where the posterior is (refine); in "
+            "the place of an emulator that was made with narrower priors make a new one.",
             "inaccurate-emulator",
         )
     if at_bounds:
@@ -317,7 +319,10 @@ def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> flo
 
 
 def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[Ends, Ends]:
-    """Return where the posterior is at bounds of priors, and where more of it than of the prior is beyond all runs."""
+    """Return where the posterior is at bounds of priors, and where more of it than of the prior is beyond all runs.
+
+    Where runs of a narrower prior are all that the emulator knows, any of it.
+    """
     at_bounds, beyond_runs = Ends(), Ends()
     for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
         prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
@@ -327,10 +332,14 @@ def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) 
         for end, bound, run_end, sign in zip(("lower", "upper"), prior.support, run_ends, signs, strict=True):
             with np.errstate(divide="ignore", invalid="ignore"):
                 is_cut = np.isfinite(prior.log_density(bound))
-            is_beyond = sign * (values - bound) < edge if is_cut else sign * (values - run_end) < 0
-            of_prior = 0.0 if is_cut else float((sign * (prior_values - run_end) < 0).mean())
-            if posterior.weights[is_beyond].sum() > of_prior + MAX_EDGE_PROBABILITY:
-                (at_bounds if is_cut else beyond_runs).append((symbol, end))
+            at_bound = posterior.weights[sign * (values - bound) < edge].sum() if is_cut else 0.0
+            beyond = posterior.weights[sign * (values - run_end) < 0].sum()
+            of_prior = float((sign * (prior_values - run_end) < 0).mean())
+            are_of_another = of_prior > MAX_LEFT_OUT
+            if at_bound > MAX_EDGE_PROBABILITY:
+                at_bounds.append((symbol, end))
+            if (are_of_another or not is_cut) and beyond > MAX_EDGE_PROBABILITY + of_prior * (not are_of_another):
+                beyond_runs.append((symbol, end))
     return at_bounds, beyond_runs
 
 

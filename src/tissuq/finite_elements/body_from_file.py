@@ -197,6 +197,25 @@ class BodyFromFile(Case):
                 f"{len(mesh.cells)}, the first at x, y, z = {corner}): mend them in the program that made the mesh."
             )
 
+        self._check_merged(mesh)
+
+    def _check_merged(self, mesh: Mesh) -> None:
+        """Refuse parts with points at the same places, where they only look as if they were one."""
+        from scipy.spatial import KDTree
+
+        parts = mesh.parts
+        if not parts.any():
+            return
+        pairs = KDTree(mesh.points).query_pairs(NEARLY * float(np.ptp(mesh.points)), output_type="ndarray")
+        loose = pairs[parts[pairs[:, 0]] != parts[pairs[:, 1]]]
+        if len(loose):
+            place = ", ".join(f"{value:.4g}" for value in mesh.vectors(mesh.points[loose[0, :1]])[0])
+            raise InputError(
+                f"the mesh '{self.file}' has parts that touch and share no points ({len(loose)} places, the first at "
+                f"x, y, z = {place}), so that they would come apart: merge the points there (Gmsh: Coherence) and "
+                "write the mesh again."
+            )
+
     def _check_sets(self) -> None:
         """Refuse sets, and directions in which they are held, that there are not."""
         mesh, sets = self._mesh_and_sets()
@@ -234,22 +253,32 @@ class BodyFromFile(Case):
         across = np.linalg.norm(np.delete(mesh.points, AXIAL, axis=1), axis=1)
         behind = tip.radius - np.sqrt(np.maximum(tip.radius**2 - across**2, 0)) if np.isfinite(tip.radius) else 0.0
         in_reach = tip.points & (begun + behind < self.travel) & (across <= tip.radius)
+        if not in_reach.any():
+            raise InputError(
+                f"the tip comes to no point of the set '{self.press}': a sphere's centre is where the coordinates "
+                f"across {self.axis} are zero. Move the mesh there, or give a longer distance or a larger radius."
+            )
         if (in_reach & supports.fixed[:, AXIAL]).any():
             raise InputError(f"points of the set '{self.press}' that the tip comes to are held along {self.axis}.")
 
     def _check_held(self) -> None:
-        """Refuse supports that leave the body free to move as a whole."""
+        """Refuse supports that leave the body free to move as a whole, or a part of it that shares no points."""
         mesh = self._mesh_and_sets()[0]
         supports = self.supports(mesh.points)
         held = supports.fixed.copy()
         held[:, AXIAL] |= supports.moved
-        motions = _rigid_motions(mesh.points, self.shape)
-        free = len(motions) - np.linalg.matrix_rank(motions[:, held], tol=1e-6)
-        if free:
-            raise InputError(
-                f"the supports leave the body of '{self.file}' free to move or turn as a whole ({free} of "
-                f"{len(motions)} ways): hold more sets, such as ymin={AXES[: mesh.points.shape[1]]}."
-            )
+        parts = mesh.parts
+        for number in np.unique(parts):
+            points = parts == number
+            motions = _rigid_motions(mesh.points[points], self.shape)
+            free = len(motions) - np.linalg.matrix_rank(motions[:, held[points]], tol=1e-6)
+            if free:
+                count = parts.max() + 1
+                whole = "as a whole" if count == 1 else f"in one of its {count} parts, which share no points"
+                raise InputError(
+                    f"the supports leave the body of '{self.file}' free to move or turn {whole} ({free} of "
+                    f"{len(motions)} ways): hold more sets, such as ymin={AXES[: mesh.points.shape[1]]}."
+                )
 
 
 @lru_cache(maxsize=MESHES)

@@ -105,6 +105,16 @@ class Mesh(NamedTuple):
         """The kind of its cells."""
         return CELL_KINDS[self.points.shape[1], self.cells.shape[1]]
 
+    @property
+    def parts(self) -> IndexArray:
+        """The number (n,) of the part that a point is of: parts share no points with each other."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        first = np.repeat(self.cells[:, 0], self.cells.shape[1])
+        links = coo_array((np.ones(len(first)), (first, self.cells.ravel())), shape=(len(self.points),) * 2)
+        return np.asarray(connected_components(links, directed=False)[1], dtype=np.intp)
+
     def region(self, kind: str = "", **options: Any) -> Any:
         """Return FElupe's region of its cells, or one of a further kind, such as ``Boundary``, with its options."""
         library = felupe()

@@ -39,6 +39,7 @@ def read_mesh(path: Path) -> MeshFile:
     """Return the mesh in a file, with the sets in it and those at its ends, ``xmin`` to ``zmax``.
 
     Sets are those of points (``*NSET``), and the points of named groups of cells (physical groups of Gmsh, ``*ELSET``).
+    A cell that stands there several times counts once.
 
     Raises
     ------
@@ -108,8 +109,9 @@ def _used(path: Path, mesh: Any) -> MeshFile:
             {"triangle", "tetra"} & {*kinds}
         )
         raise InputError(f"'{path}' has cells {', '.join(kinds)}; use one of {usable_kinds}.{linear}")
-    cells = np.concatenate([block.data for block in blocks]).astype(np.intp)
-    cells = np.searchsorted(used, cells)
+    cells = np.searchsorted(used, np.concatenate([block.data for block in blocks]).astype(np.intp))
+    _, first_places = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
+    cells = cells[np.sort(first_places)]  # older files of Gmsh have a cell once for each of its physical groups
     dimensions = names[kinds[0]]
     points = np.asarray(mesh.points, dtype=np.float64)[used]
     if not np.isfinite(points).all():

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tissuq.arrays import FloatArray
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.stability import calibrated_range
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -112,9 +112,17 @@ def check_one_control(loading: LoadingMode) -> None:
 
 
 def patient_band(
-    population: PopulationDraws, loading: LoadingMode, points: FloatArray, prob: float, **options: Any
+    population: PopulationDraws,
+    loading: LoadingMode,
+    points: FloatArray,
+    prob: float,
+    *,
+    channel: int,
+    discrepancy: bool,
 ) -> FloatArray:
     """Return low, median and high (3, g) of the stress of a new specimen, whose model error is a random specimen's.
+
+    At every point it is that of one of the specimens that were measured there, which share all draws among them.
 
     Parameters
     ----------
@@ -125,7 +133,7 @@ def patient_band(
         Where.
     prob : float
         Between low and high.
-    **options
+    channel, discrepancy
         As of `patient_curves`.
 
     Raises
@@ -137,19 +145,37 @@ def patient_band(
     coordinates, specimens = population.coordinates, population.hierarchy.specimens
     chains, draws, count, size = specimens.shape
     line_values, patients = specimens.reshape(-1, count, size), population.new.reshape(-1, size)
-    curves = []
-    for i, posterior in enumerate(population.posteriors.values()):
-        rows = np.arange(i, chains * draws, count)
-        matching = matching_draws(posterior, coordinates, line_values[rows, i])
-        curves.append(patient_curves(posterior, coordinates, matching, patients[rows], points, mode=loading, **options))
-    stresses = np.concatenate(curves)
-    unseen = np.isnan(stresses).all(axis=0)
-    if unseen.any():
+    posteriors = list(population.posteriors.values())
+    is_known = np.array([_knows_error(posterior, loading, points) for posterior in posteriors]) | (not discrepancy)
+    if not is_known.any(axis=0).all():
         raise InputError(
-            f"no specimen was measured at {loading.controls[0].name} {points[unseen][0]:g}, so that the model "
-            "error there is unknown: predict nearer to the data, or with discrepancy=False."
+            f"no specimen was measured at {loading.controls[0].name} {points[~is_known.any(axis=0)][0]:g}, so that the "
+            "model error there is unknown: predict nearer to the data, or with discrepancy=False."
         )
-    return np.asarray(np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0))
+    stresses = np.empty((chains * draws, len(points)))
+    patterns, pattern_of = np.unique(is_known, axis=1, return_inverse=True)
+    for i, posterior in enumerate(posteriors):
+        matching = matching_draws(posterior, coordinates, line_values[:, i])
+        for number in np.flatnonzero(patterns[i]):
+            members, columns = np.flatnonzero(patterns[:, number]), np.flatnonzero(pattern_of.ravel() == number)
+            rows = np.arange(int(np.searchsorted(members, i)), chains * draws, len(members))
+            stresses[rows[:, None], columns] = patient_curves(
+                posterior, coordinates, matching[rows], patients[rows], points[columns], mode=loading, channel=channel,
+                discrepancy=discrepancy,
+            )  # fmt: skip
+    return np.asarray(np.quantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0))
+
+
+def _knows_error(posterior: Posterior, mode: LoadingMode, points: FloatArray) -> BoolArray:
+    """Return at which points (g,) of a mode the model error of a specimen is known: where it was measured.
+
+    That is nowhere in other modes than its own if its error is not an energy.
+    """
+    model = posterior.model
+    if mode not in model.experiment.modes and not model.discrepancy.is_energy:
+        return np.zeros(len(points), dtype=bool)
+    low, high = calibrated_range(model, mode)
+    return np.asarray((points >= low - STRETCH_STEP) & (points <= high + STRETCH_STEP))
 
 
 def patient_curves(
@@ -163,9 +189,7 @@ def patient_curves(
     channel: int,
     discrepancy: bool,
 ) -> FloatArray:
-    """Return stresses (N, g) of new specimens whose model error is that of one specimen.
-
-    They are nan where the specimen was not measured; and in other modes than its own if its error is not an energy.
+    """Return stresses (N, g) of new specimens whose model error is that of one specimen, where that is known.
 
     Parameters
     ----------
@@ -190,19 +214,12 @@ def patient_curves(
     curves = engineering_stress(model.material, mode.paths[channel], stretch, values)
     if not discrepancy:
         return curves
-    if mode not in model.experiment.modes and not model.discrepancy.is_energy:
-        return np.full_like(curves, np.nan)
     _, error = drawn_curves(model, draws, model.experiment.states_at(stretch, mode, channel))
     specimen_modulus, patient_modulus = (
         _initial_modulus(model.material, parameters) for parameters in (specimen_values, values)
     )
-    curves = (
-        curves
-        + error
-        * (patient_modulus / np.maximum(specimen_modulus, MIN_MODULUS_RATIO * np.median(specimen_modulus)))[:, None]
-    )
-    low, high = calibrated_range(model, mode)
-    return np.where((stretch < low - STRETCH_STEP) | (stretch > high + STRETCH_STEP), np.nan, curves)
+    least = MIN_MODULUS_RATIO * np.median(specimen_modulus)
+    return np.asarray(curves + error * (patient_modulus / np.maximum(specimen_modulus, least))[:, None])
 
 
 def _diagnostics(hierarchy: Hierarchy, values: FloatArray, symbols: tuple[str, ...]) -> Diagnostics:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -55,7 +56,10 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
         "fitted_errors": vars(model.fitted_errors) | {"curve": None, "slopes": None},
         "count": model.statistics.count,
     }
-    arrays: dict[str, Any] = {"triangle": (("row", "column"), model.statistics.triangle)}
+    arrays: dict[str, Any] = {
+        "triangle": (("row", "column"), model.statistics.triangle),
+        "unit_stresses": (("state", "column_of_law"), _unit_stresses(model), {"units": "MPa"}),
+    }
     if model.fitted_errors.curve is not None:
         arrays["curve"] = ("measurement", model.fitted_errors.curve, {"units": "MPa"})
     if model.fitted_errors.slopes is not None:
@@ -121,7 +125,35 @@ def _recorded_model(
         Statistics(plain["count"], group.arrays["triangle"]),
     )
     priors = {symbol: prior_from(prior) for symbol, prior in plain["priors"].items()}
-    return model if model.priors == priors else replace(model, chosen_priors=priors)
+    model = model if model.priors == priors else replace(model, chosen_priors=priors)
+    _check_unchanged(model, group.arrays.get("unit_stresses"))
+    return model
+
+
+STATES_OF_LAW = 8
+"""Measured states at most at which a file remembers what the law says."""
+SAME_LAW = 1e-6
+"""Largest difference of such stresses over the largest of them, of a law that is the same in other words."""
+
+
+def _unit_stresses(model: StatisticalModel) -> FloatArray:
+    """Return what a law says at few measured states, for a unit of each linear parameter."""
+    states = model.experiment.states
+    places = np.unique(np.linspace(0, len(states) - 1, STATES_OF_LAW).astype(int))
+    return model.basis(states.among(places), model.usual_bent)
+
+
+def _check_unchanged(model: StatisticalModel, recorded: FloatArray | None) -> None:
+    """Refuse a law that says something else than the one that was fitted; what that said older files do not tell."""
+    if recorded is None:
+        return
+    found, size = _unit_stresses(model), float(np.abs(recorded[np.isfinite(recorded)]).max(initial=0.0))
+    if found.shape == recorded.shape and np.allclose(found, recorded, rtol=0, atol=SAME_LAW * size, equal_nan=True):
+        return
+    raise InputError(
+        f"the material '{model.material.name}' has other stresses than when this posterior was fitted, so that its "
+        "parameters would mean something else: take the law as it was then, or fit anew."
+    )
 
 
 def _standard_error_of(test: Experiment) -> dict[str, Any]:
