@@ -85,6 +85,12 @@ def test_tables_have_their_columns_at_every_time(tmp_path):
     np.testing.assert_array_equal(tables["displacements", "TOP"].values, [[[0.1, -0.2, 0.0]]])
 
 
+def test_numbers_whose_exponent_has_no_letter_do_not_end_a_table(tmp_path):
+    (tmp_path / "job.dat").write_text(DAT.replace("  1   1  1.0  2.0", "  1   1  1.0-100 -2.0+101"))
+    stress = read_dat(tmp_path / "job.dat")["stresses", "EALL"].values[0]
+    np.testing.assert_array_equal(stress, [[1e-100, -2e101, 3, 4, 5, 6], [7, 8, 9, 1, 2, 3]])
+
+
 def test_mesh_materials_and_fields_are_read_up_to_a_time(tmp_path):
     (tmp_path / "job.frd").write_text(FRD)
     found = read_frd(tmp_path / "job.frd", last_time=0.5)

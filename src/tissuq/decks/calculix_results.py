@@ -22,6 +22,8 @@ __all__ = ["CELL_TYPES", "SECTORS_OF_RING", "CalculiXResults", "Frd", "Table", "
 TABLE = re.compile(
     r"^\s*(?P<what>[a-z][a-z ]*?)\s*\((?P<columns>[^)]*)\) for set (?P<set>\S+) and time\s+(?P<time>\S+)"
 )
+WITHOUT_LETTER = re.compile(r"(?<=\d)(?=[+-]\d{3}\b)")
+"""Where Fortran leaves out the E of an exponent of three digits, such as 1.2-100."""
 CELL_TYPES = {
     1: ("hexahedron", 8), 2: ("wedge", 6), 3: ("tetra", 4), 4: ("hexahedron20", 20), 5: ("wedge15", 15),
     6: ("tetra10", 10), 7: ("triangle", 3), 8: ("triangle6", 6), 9: ("quad", 4), 10: ("quad8", 8), 11: ("line", 2),
@@ -157,7 +159,7 @@ def read_dat(path: Path) -> dict[tuple[str, str], Table]:
             times.append(float(head["time"]))
             tables.append(rows)
         elif rows is not None and line.strip():
-            words = line.split()[skip:]
+            words = WITHOUT_LETTER.sub("E", line).split()[skip:]
             if words[-1:] == ["L"]:
                 local.add(key)
                 words.pop()
