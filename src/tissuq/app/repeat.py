@@ -9,8 +9,6 @@ from typing import Any
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of
 
-__all__ = ["Repeat", "command", "fit_lines", "reading_words"]
-
 Repeat = dict[str, str]
 """A ``shell`` command and lines of ``python``."""
 OF_FILES = ("file", "name", "specimen", "direction", "condition", "noise_sd")

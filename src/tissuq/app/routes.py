@@ -19,8 +19,6 @@ from tissuq.app.sessions import MAX_FILE, MEGABYTE, Session, Sessions, store
 from tissuq.app.tasks import TASKS
 from tissuq.errors import TissuqError
 
-__all__ = ["STATIC", "routes"]
-
 STATIC = Path(__file__).parent / "static"
 REPORT_POLICY = (
     "sandbox allow-scripts allow-modals; default-src 'none'; img-src data:; style-src 'unsafe-inline'; "

@@ -17,8 +17,6 @@ from tissuq.app.workers import News, Workers
 from tissuq.errors import InputError
 from tissuq.studies.settings import is_inside
 
-__all__ = ["GRACE", "MAX_FILE", "MAX_TOTAL", "Session", "Sessions", "harmless_name", "store"]
-
 GRACE = 15.0
 """Seconds after which a session ends whose page has gone."""
 MAX_SESSIONS = 50

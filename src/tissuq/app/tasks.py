@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from tissuq.report.result import Result
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["TASKS", "Say", "warm_up"]
-
 Say = Callable[[str, Any], None]
 """Is told what has come of a task so far: the kind of news, and plain data."""
 RUNS, CARDS = Path("runs"), Path("cards")

@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from tissuq.report.result import Record, Result
     from tissuq.studies.finite_element_settings import ModelSettings
 
-__all__ = [
-    "SCHEDULER", "Call", "Campaign", "Configured", "IntoFolder", "LawOfRun", "OfRun", "Running", "SolverOptions",
-    "Verbosity", "Written", "check_folder", "not_converged", "write_campaign_recipe",
-]  # fmt: skip
-
 SCHEDULER = "Address of a Dask scheduler to use instead, or slurm:memory=4GB,walltime=02:00:00 for batch jobs."
 
 

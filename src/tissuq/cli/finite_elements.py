@@ -17,8 +17,6 @@ from tissuq.studies.option_texts import once_each
 if TYPE_CHECKING:
     from tissuq.studies.ensemble import PreparedEnsemble
 
-__all__ = ["ensemble", "structure"]
-
 FINER_MESH = "finer-mesh"
 """What the copy of a finer mesh is called."""
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["calibrate", "fit", "population"]
-
 
 class FitOptions(Written):
     """How files are taken, among how many processes several laws are divided, and how the run is written."""

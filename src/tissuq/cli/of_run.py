@@ -18,8 +18,6 @@ from tissuq.studies.settings import seen_from
 if TYPE_CHECKING:
     from tissuq.posterior.drawn_materials import Sampling
 
-__all__ = ["design", "export", "predict"]
-
 
 @command(PredictionSettings, OfRun, out="Folder for the prediction [RUN-MODE, beside the run].")
 def predict(call: Call[PredictionSettings, OfRun]) -> None:

@@ -19,12 +19,11 @@ from tissuq.report.calibration_figures import band_figure, check_figure, margina
 from tissuq.report.calibration_in_words import finding_of, names_of, next_step_of, uses_of_calibration
 from tissuq.report.inputs import Copies
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, known_number, significant
 from tissuq.report.writer import posterior_files
-from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy
-
-__all__ = ["calibration_result"]
+from tissuq.studies.calibration import CalibrationStudy
+from tissuq.studies.calibration_settings import CalibrationSettings
+from tissuq.studies.settings import INPUT
 
 WORST_RUNS = 8
 """Rows of the page's table of runs that were left out."""

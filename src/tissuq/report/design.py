@@ -18,14 +18,13 @@ from tissuq.next_test.ranking import TIED
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import said_by
 from tissuq.report.tables import significant
-from tissuq.studies.design import DesignSettings, DesignStudy
+from tissuq.studies.design import DesignStudy
+from tissuq.studies.run_settings import DesignSettings
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["design_figure", "design_result", "design_table"]
 
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""

@@ -8,12 +8,9 @@ from typing import Any, NamedTuple
 
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics.user_law import LAW
-from tissuq.report.run_folder import INPUT
-from tissuq.studies.laws import LawSettings
+from tissuq.studies.fit_settings import LawSettings, SpecimenSettings
 from tissuq.studies.measured_file import MeasuredFile
-from tissuq.studies.specimen import SpecimenSettings
-
-__all__ = ["Copies", "Inputs", "inputs_of"]
+from tissuq.studies.settings import INPUT
 
 
 class Copies:

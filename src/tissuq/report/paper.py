@@ -22,8 +22,6 @@ from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, FORMULATIONS, Fitted
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["paper_result"]
-
 MPA = StressUnit("MPa", 1.0)
 GROUPS = {
     1: ("none", "constant", "linear", "quadratic"),

@@ -39,19 +39,16 @@ from tissuq.report.population_in_words import (
     patient_in_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, rows_of, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
-from tissuq.studies.settings import DATA
+from tissuq.studies.settings import DATA, INPUT
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tissuq.model.tolerances import Tolerances
     from tissuq.population import Population
-
-__all__ = ["population_result"]
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""

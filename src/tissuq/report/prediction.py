@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
     from tissuq.studies.run_settings import PredictionSettings
 
-__all__ = ["band_table", "prediction_figure", "prediction_result", "score_table"]
-
 SCORES = ("crps", "interval_score")
 """Columns that are stresses."""
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."

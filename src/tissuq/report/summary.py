@@ -19,11 +19,6 @@ from tissuq.report.tables import (
     table_files,
 )
 
-__all__ = [
-    "FOLLOWS", "SAME_STATES", "held_out_files", "held_out_table", "parameter_rows", "parameter_table",
-    "stability_cells", "stability_rows", "stability_section", "summary_row", "summary_table", "summary_tables",
-]  # fmt: skip
-
 HOW_TO_READ = (
     "Intervals are the shortest that hold 95 %. In band, alone: share of measurements inside the 95 % band with the "
     "discrepancy, and inside that of the material alone.{stability} A good predictive check does not mean "

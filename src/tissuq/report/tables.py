@@ -12,11 +12,6 @@ from typing import Any
 from tissuq.arrays import FloatArray
 from tissuq.experiments.units import StressUnit
 
-__all__ = [
-    "Row", "in_unit_of", "interval", "known_number", "percent", "rows_of", "significant", "stretch_in_words",
-    "table_files", "with_named_units", "write_csv", "write_json",
-]  # fmt: skip
-
 Row = dict[str, Any]
 
 MAX_DIGITS = 5

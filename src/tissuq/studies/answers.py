@@ -15,8 +15,6 @@ from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of, stated
 from tissuq.studies.settings import imported
 
-__all__ = ["DIMENSIONS", "Answer", "answers_in", "options_in", "with_options"]
-
 READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
 """How every option of reading is taken, by its name; that which says no stands for the same setting."""
 READING |= {slot.option.negative: slot for slot in READING.values() if slot.option.negative}

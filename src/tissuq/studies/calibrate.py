@@ -38,8 +38,6 @@ from tissuq.studies.stream import (
     write_whole,
 )  # fmt: skip
 
-__all__ = ["calibrate", "runs_of"]
-
 
 def calibrate(
     control: ArrayLike | Mapping[str, ArrayLike],

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from tissuq.emulation.forward import Forward
     from tissuq.parameters.priors import Prior
 
-__all__ = ["CalibrationSettings", "OfModel"]
-
 OWN = "Your own finite-element model"
 NUMBER = r"\d+\.?\d*"
 RANGE = re.compile(rf"{NUMBER}:{NUMBER}")

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.model.noise import Noise
 
-__all__ = ["ALL", "LawSettings", "PopulationSettings", "SpecimenSettings"]
-
 ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply; in place of laws: all."""
 

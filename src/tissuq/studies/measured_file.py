@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from tissuq.model.noise import Noise
     from tissuq.model.tolerances import Tolerances
 
-__all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
-
 READING = "Reading files"
 HELP_ON_AXIAL_STRETCH = (
     "Of a tube that was stretched along its axis, then inflated: length over undeformed length; to fit several files "

@@ -10,11 +10,6 @@ from typing import Any
 
 from tissuq.errors import InputError
 
-__all__ = [
-    "column", "noises", "number_or_text", "once_each", "pairs_of", "priors", "range_of", "sd_or_unknown",
-    "share", "tolerances",
-]  # fmt: skip
-
 
 def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return the pairs of a repeatable option as a dictionary, each name given once."""

@@ -19,11 +19,6 @@ from tissuq.errors import InputError, TissuqError
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = [
-    "DAMAGE", "DATA", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
-    "looked_up", "positive_or_unknown", "seen_from", "setting_of", "there_is",
-]  # fmt: skip
-
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
 DATA = "data.csv"

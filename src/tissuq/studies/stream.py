@@ -30,20 +30,6 @@ from typing import Any, Generic, ParamSpec, Protocol, TypeVar
 from tissuq.errors import InputError
 from tissuq.studies.batch_jobs import is_queue, workers_in_queue
 
-__all__ = [
-    "RESULTS",
-    "Campaign",
-    "Step",
-    "WorkerProcesses",
-    "forget_results",
-    "open_pool",
-    "read_results",
-    "run_tasks",
-    "silent",
-    "unfinished",
-    "write_whole",
-]
-
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
 

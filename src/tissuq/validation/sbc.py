@@ -29,21 +29,6 @@ from tissuq.validation.coverage.settings import BLOCK, Design
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "SIZE",
-    "SbcSettings",
-    "Task",
-    "carry_out",
-    "draw_from_prior",
-    "ecdf_band",
-    "probabilities_of",
-    "run_sbc",
-    "shape_p_value",
-    "spread_p_value",
-    "summarise_ranks",
-    "tasks_of",
-]
-
 PRIORS: dict[str, Prior] = {
     "C10": Uniform(0.5, 1.5),
     **{symbol: Normal(0, 0.3) for symbol in ("m0", "m1", "m2", "C01")},

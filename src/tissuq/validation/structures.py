@@ -31,21 +31,6 @@ from tissuq.studies.stream import Campaign
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "DEFAULT",
-    "KNOWN_LAWS",
-    "ORACLE",
-    "STRUCTURES",
-    "KnownLaw",
-    "StructureStudySettings",
-    "StructureTask",
-    "carry_out",
-    "run_structures",
-    "simulated_tests",
-    "summarise_structures",
-    "tasks_of",
-]
-
 
 class KnownLaw(NamedTuple):
     """A law with its parameters, MPa where they are stresses, and what priors an oracle has that differ."""

@@ -24,16 +24,6 @@ from tissuq.experiments.reading.layout import FEWEST_ROWS, MISSING, WHITESPACE, 
 from tissuq.experiments.reading.table import Lines, Table, filled_on, padded
 from tissuq.experiments.units import looks_like_unit, measured_in
 
-__all__ = [
-    "blocks_of",
-    "joined_where_they_go_on",
-    "names_above",
-    "names_said_otherwise",
-    "title_of",
-    "transposed_table",
-    "with_names_above",
-]
-
 SAME, FAR = 0.1, 0.5
 """Share of the range of a column within which all blocks begin, and by which one of them goes back at a blank line."""
 MOST_STEPS = 2

@@ -37,8 +37,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLE_OF_AXIAL_STRETCH, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
-__all__ = ["about_stress", "choose_columns", "mapping_of_each_stress"]
-
 
 def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:
     """Return the columns of every stress of a mode, by what it is called; of a mode with one by an empty text.

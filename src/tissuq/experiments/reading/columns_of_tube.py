@@ -28,17 +28,6 @@ from tissuq.experiments.reading.vocabulary import (
 )
 from tissuq.experiments.units import FORCE, measured_in
 
-__all__ = [
-    "HOW_TO_READ_TUBE",
-    "HOW_TO_SAY_AXIAL_STRETCH",
-    "column_of_axial_stretch",
-    "columns_of_tube",
-    "is_axial_displacement",
-    "is_of_length",
-    "mode_of_tube",
-    "with_columns_of_tube",
-]
-
 FORCES = ("force", TOTAL_FORCE)
 """Roles of an axial force: without what the pressure on the closed ends pulls with, and with it."""
 ROLES_BESIDE = ("length", ROLE_OF_AXIAL_STRETCH)

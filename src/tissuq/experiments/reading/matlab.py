@@ -13,8 +13,6 @@ import numpy as np
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
 from tissuq.experiments.reading.headings import heading, is_of_role
 
-__all__ = ["MatlabFile"]
-
 FEWEST_ROWS = 2
 """Length of a vector that may be a column."""
 AXES = 2

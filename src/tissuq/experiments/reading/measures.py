@@ -15,9 +15,6 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.tube import Tube
 from tissuq.experiments.reading.twisted_disc import rim_stress
 
-__all__ = ["STRAIN_MEASURES", "STRESS_MEASURES", "StrainMeasure", "StressMeasure", "measure_of_tube"]
-
-
 ENGINEERING = (
     r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|инженерн\w+|"
     r"номинальн\w+|условн\w+"

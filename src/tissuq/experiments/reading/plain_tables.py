@@ -19,8 +19,6 @@ from tissuq.experiments.reading.layout import MISSING, WHITESPACE, joined, split
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import SPREADS
 
-__all__ = ["with_plain_numbers", "without_statements_beside", "without_summary"]
-
 LARGEST_SHARE = 0.5
 """Share of the rows of a table beside which statements stand; a column of measurements goes on to its end."""
 ROWS_OF_STATEMENT = 2

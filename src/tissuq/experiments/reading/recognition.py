@@ -14,26 +14,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES, ROLES_OF_TUBE, other_quantity
 from tissuq.experiments.units import measured_in
 
-__all__ = [
-    "DEFORMATIONS",
-    "DEFORMATIONS_OF_UNITS",
-    "DIAMETERS",
-    "LENGTHENINGS",
-    "LOADS",
-    "OTHER_MEASURE",
-    "PRESSURE",
-    "SHEARS",
-    "TOTAL_FORCE",
-    "ColumnChoice",
-    "Contents",
-    "ambiguous",
-    "columns_there_are",
-    "find_column",
-    "recognise",
-    "say_which",
-    "told_by_unit",
-]
-
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
 *DIAMETERS, PRESSURE, TOTAL_FORCE = ROLES_OF_TUBE

@@ -17,8 +17,6 @@ from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import StressUnit
 
-__all__ = ["check_signs", "with_signs"]
-
 SIGNED = ("strain", "displacement", *SHEARS)
 """Deformations that may be counted the other way round."""
 NEGLIGIBLE_STRAIN = 0.1

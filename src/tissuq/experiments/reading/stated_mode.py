@@ -28,23 +28,6 @@ from tissuq.experiments.reading.recognition import SHEARS
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, ROLES
 
-__all__ = [
-    "DEFAULT_MODE",
-    "DEFAULT_SOURCE",
-    "GIVEN",
-    "about_mode",
-    "check_not_inflated",
-    "check_not_sheared",
-    "comment_on_mode",
-    "direction_of",
-    "find_mode",
-    "is_named_by_mode",
-    "is_torque",
-    "mode_in_comment",
-    "mode_of",
-    "modes_in_column",
-]
-
 DEFAULT_MODE = "uniaxial"
 """Where nothing states one."""
 GIVEN, DEFAULT_SOURCE = "as given", "nothing says otherwise"

@@ -11,9 +11,6 @@ from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.law_mixture import EVERY_LAW, LawMixture, not_negative
 
-__all__ = ["SAME_STRETCH", "Tube", "rows_at_each_stretch"]
-
-
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 """Of Gauss quadrature through the wall, from the outer to the inner face."""
 MOST_ROWS = 400

@@ -23,18 +23,6 @@ from tissuq.validation.coverage.truths import TRUTHS, Truth, draw_truth
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "Task",
-    "carry_out",
-    "run_campaign",
-    "share_of_new",
-    "stress_unseen",
-    "summarise",
-    "summarise_unseen",
-    "tasks_of",
-    "unseen_stretches",
-]
-
 
 POINTS = 12
 """Stretches of a loading mode that was not measured."""

@@ -14,37 +14,6 @@ from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.invariants import invariant_rates, invariants
 
-__all__ = [
-    "FAMILIES",
-    "FIXED",
-    "FURTHER",
-    "MIN_LOCKING_LIMIT",
-    "SMALL_STRAINS",
-    "TRUTHS",
-    "Law",
-    "Truth",
-    "arruda_boyce",
-    "carroll",
-    "coupled",
-    "demiray",
-    "draw_truth",
-    "exp_ln",
-    "exponential_softening",
-    "gent",
-    "gent_gent",
-    "hart_smith",
-    "hyperbolic_softening",
-    "knowles",
-    "lopez_pamies",
-    "mooney_rivlin",
-    "neo_hookean",
-    "ogden",
-    "power_softening",
-    "recruitment",
-    "veronda_westmann",
-    "yeoh",
-]
-
 Law = Callable[[LoadingMode, FloatArray], FloatArray]
 """The engineering stress (n,) at stretches (n,) in a loading mode, in units of C10."""
 Derivatives = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]

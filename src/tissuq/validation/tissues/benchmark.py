@@ -29,23 +29,6 @@ from tissuq.validation.tissues.corpus import TissueSet, read_corpus
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "ALL",
-    "END_SHARE",
-    "ESTIMAND_OF_PROTOCOL",
-    "PROBABILITIES",
-    "PROTOCOLS",
-    "RIVALS",
-    "PredictionTask",
-    "Split",
-    "TissueSettings",
-    "predicted",
-    "run_benchmark",
-    "summarise_tissues",
-    "summarise_verdicts",
-    "tasks_of",
-]
-
 
 PROBABILITIES = (0.5, 0.8, 0.95)
 """Of the intervals whose coverage is counted; the last is that of half widths and scores."""
