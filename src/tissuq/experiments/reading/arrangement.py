@@ -259,8 +259,7 @@ def _joined(quantity: str, label: str) -> str:
     name, of_label = heading(quantity), heading(label)
     is_statistic = is_of_mean(of_label.quantity) or of_spread(of_label.quantity)[0]
     words = f"{name.quantity} {of_label.quantity}" if is_statistic else name.quantity
-    unit = of_label.unit or name.unit
-    return f"{words} ({unit})" if unit else words
+    return (of_label if of_label.unit else name).with_unit(words)
 
 
 def names_above(table: Table, columns: Sequence[int], *, are_distinct: bool = True) -> list[str]:

@@ -113,6 +113,10 @@ class Heading:
     quantity: str
     unit: str = ""
 
+    def with_unit(self, name: str) -> str:
+        """Return another name with the unit, if there is one."""
+        return f"{name} ({self.unit})" if self.unit else name
+
 
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:

@@ -309,5 +309,4 @@ def _names(name: str) -> tuple[str, str]:
     kind, _ = of_spread(plain(words["kind"] or "")) if words else ("", "")
     of_mean = SPREAD_IN_NAME.sub(" ", name).strip()
     name_of_mean = heading(of_mean)
-    of_spreads = f"{name_of_mean.quantity} {kind if kind in SPREADS else '±'}"
-    return of_mean, f"{of_spreads} ({name_of_mean.unit})" if name_of_mean.unit else of_spreads
+    return of_mean, name_of_mean.with_unit(f"{name_of_mean.quantity} {kind if kind in SPREADS else '±'}")

@@ -6,10 +6,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import Self
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, plain
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, contents_of, dimensions_named, plain
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES, ROLES_OF_TUBE, other_quantity
 from tissuq.experiments.units import measured_in
@@ -78,6 +80,13 @@ class Contents:
     measures: Sequence[str]
     strain_type: str | None = None
     stress_type: str | None = None
+
+    @classmethod
+    def of(cls, table: Table, options: ReadingOptions) -> Self:
+        """Return what the columns of a table hold, and which measures are asked for."""
+        names = contents_of(table.names, [table.unit(column) for column in range(len(table.names))])
+        quantities, measures = [name for name, _ in names], [measure for _, measure in names]
+        return cls(quantities, measures, options.get("strain_type"), options.get("stress_type"))
 
     def fitting(self, *roles: str) -> list[int]:
         """Return the columns that may have one of the roles: of several those of the measure that is wanted.
