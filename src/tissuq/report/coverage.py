@@ -15,13 +15,7 @@ if TYPE_CHECKING:
 
 MIN_RELATIVE_ERROR = 1e-9
 """Monte Carlo error, relative to its number, below which it is rounding and shown as zero."""
-SETTING_HEADERS = {
-    "design": "design",
-    "strength": "strength",
-    "noise": "noise",
-    "family": "family",
-    "mode": "loading mode",
-}
+SETTING_HEADERS = {name: name for name in ("design", "strength", "noise", "family")} | {"mode": "loading mode"}
 OF_COVERAGE = {
     "fits": ("fits", "count"),
     "coverage": ("coverage", "percent"),

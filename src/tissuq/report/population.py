@@ -148,7 +148,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),
-        files=files | copies.files | posterior_files({PATIENT: population.patient}),
+        files=files | copies | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 

@@ -110,7 +110,7 @@ def prediction_result(
         tables=tuple(tables),
         sections=_sections(prediction),
         warnings=tuple(prediction.warnings),
-        files=files | copies.files,
+        files=files | copies,
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 

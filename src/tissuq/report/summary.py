@@ -85,10 +85,7 @@ def summary_row(
 
 def headline_of(row: Row) -> str:
     """Return the parameter whose posterior the row of a formulation gives."""
-    names = [name.removesuffix("_mean") for name in row if name.endswith("_mean")]
-    if not names:
-        raise KeyError("the row names no parameter")
-    return names[0]
+    return next(name.removesuffix("_mean") for name in row if name.endswith("_mean"))
 
 
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:

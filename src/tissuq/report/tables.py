@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from math import floor, inf, isfinite, log10
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from tissuq.arrays import FloatArray
@@ -45,10 +46,10 @@ def table_files(name: str, rows: Sequence[Row], columns: Sequence[str], unit: St
     return {f"{name}.csv": with_named_units(rows, columns, unit), f"{name}.json": in_unit_of(rows, columns, unit)}
 
 
-def rows_of(columns: Mapping[str, FloatArray], labels: Row) -> list[Row]:
-    """Return columns of numbers as rows, each with labels before them."""
-    values = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return [labels | dict(zip(columns, row, strict=True)) for row in values]
+def rows_of(columns: Mapping[str, FloatArray], labels: Mapping[str, Any] = MappingProxyType({})) -> list[Row]:
+    """Return columns of numbers as rows, each with labels before them; None for numbers that are missing."""
+    values = zip(*(map(known_number, column.tolist()) for column in columns.values()), strict=True)
+    return [{**labels, **dict(zip(columns, row, strict=True))} for row in values]
 
 
 def known_number(number: float) -> float | None:
