@@ -22,7 +22,7 @@ from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
 from tissuq.studies.campaign_settings import SbcOptions, each_once
-from tissuq.studies.stream import Campaign
+from tissuq.studies.stream import Campaign, TaskOfFields
 from tissuq.validation.coverage.fitted import fit_all, model_of, parameters_of
 from tissuq.validation.coverage.settings import BLOCK, Design
 
@@ -142,7 +142,7 @@ def _energy_stress(model: StatisticalModel, values: dict[str, float], generator:
 
 
 @dataclass(frozen=True)
-class Task:
+class Task(TaskOfFields):
     """Some data sets of one formulation and noise, by their indices in the settings."""
 
     formulation: int
@@ -150,11 +150,6 @@ class Task:
     start: int
     count: int
     label: str
-
-    @property
-    def key(self) -> str:
-        """What tells it from every other task."""
-        return f"{self.formulation}-{self.noise}-{self.start}-{self.count}"
 
 
 def tasks_of(settings: SbcSettings) -> list[Task]:
