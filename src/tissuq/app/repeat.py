@@ -99,14 +99,12 @@ def _fit_options(settings: Mapping[str, Any], unit: str) -> Iterator[tuple[str, 
 
 def _read(test: Mapping[str, Any]) -> str:
     """Return the Python that reads a test."""
-    options = [f"{name}={_plain(value)!r}" for name, value in test.items() if name not in OF_FILES and _says(value)]
+    options = [
+        f"{name}={_plain(value)!r}" for name, value in test.items() if name not in OF_FILES and value not in (None, {})
+    ]
     labels = [f"{name}={test[name]!r}" for name in ("specimen", "direction", "condition") if test.get(name)]
     read = f"tq.read({', '.join([repr(test['file']), *options])})"
     return f"{read}.labelled({', '.join(labels)})" if labels else read
-
-
-def _says(value: Any) -> bool:
-    return value is not None and value != {}
 
 
 def _plain(value: Any) -> Any:

@@ -149,10 +149,6 @@ MIN_LOCKING_LIMIT = 20.0
 """The smallest I1 - 3 at which a Gent material locks."""
 
 
-def _random_yeoh(generator: Generator) -> Law:
-    return yeoh(0.05 * generator.standard_normal(), 0.005 * abs(generator.standard_normal()))
-
-
 def _random_ogden_of_two_terms(generator: Generator) -> Law:
     share = generator.uniform(0.2, 0.8)
     return ogden((share, generator.uniform(1, 5)), (1 - share, -generator.uniform(1, 4)))
@@ -166,7 +162,7 @@ def _decay(generator: Generator) -> float:
 FAMILIES: dict[str, Callable[[Generator], Law]] = {
     "neo-hookean": lambda generator: neo_hookean(),
     "mooney-rivlin": lambda generator: mooney_rivlin(generator.uniform(0, 1)),
-    "yeoh": _random_yeoh,
+    "yeoh": lambda generator: yeoh(0.05 * generator.standard_normal(), 0.005 * abs(generator.standard_normal())),
     "ogden": lambda generator: ogden((1.0, generator.uniform(1, 6))),
     "ogden-negative": lambda generator: ogden((1.0, -generator.uniform(1, 6))),
     "ogden-two": _random_ogden_of_two_terms,
