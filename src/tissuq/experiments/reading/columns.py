@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 
 from tissuq.errors import InputError
@@ -29,6 +29,7 @@ from tissuq.experiments.reading.recognition import (
     LOADS,
     ColumnChoice,
     Contents,
+    adding,
     columns_there_are,
     find_column,
     recognise,
@@ -79,19 +80,11 @@ def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> 
     return dict(zip(labels, choices, strict=True))
 
 
-@contextmanager
-def about_stress(number: int, labels: Sequence[str], mode: LoadingMode) -> Iterator[None]:
+def about_stress(number: int, labels: Sequence[str], mode: LoadingMode) -> AbstractContextManager[None]:
     """Add to what is wrong with a stress after the first how its columns and dimensions are given."""
-    try:
-        yield
-    except InputError as error:
-        if not number:
-            raise
-        sizes = " Along it the specimen measures --width, and across it --length." if mode.machine_axes else ""
-        raise InputError(
-            f"{error} (This is about {labels[number]}: roles of its columns end in 2, as in "
-            f"--column stress2=NAME.{sizes})"
-        ) from error
+    sizes = " Along it the specimen measures --width, and across it --length." if mode.machine_axes else ""
+    roles = "roles of its columns end in 2, as in --column stress2=NAME."
+    return adding(f"This is about {labels[number]}: {roles}{sizes}" if number else "")
 
 
 def _with_numbered_second(names: Sequence[tuple[str, str]]) -> dict[str, str | int]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Self
@@ -219,6 +220,17 @@ def _several_hint(table: Table, contents: Contents, roles: Sequence[str]) -> str
         f" If columns {columns[0] + 1} to {columns[-1] + 1} hold the stresses of several specimens, give "
         f"--column stress={columns[0] + 1}:{columns[-1] + 1} and --stress-unit."
     )
+
+
+@contextmanager
+def adding(text: str) -> Iterator[None]:
+    """Add a text, in brackets, to what is wrong; nothing where it is empty."""
+    try:
+        yield
+    except InputError as error:
+        if not text:
+            raise
+        raise InputError(f"{error} ({text})") from error
 
 
 def say_which(kind: str) -> str:
