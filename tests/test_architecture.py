@@ -43,6 +43,15 @@ def test_a_stage_imports_only_stages_to_its_left(file):
     assert not imports_of(file) & set(later)
 
 
+def test_a_name_that_begins_with_an_underscore_is_of_its_module_alone():
+    for file in ROOT.rglob("*.py"):
+        nodes = [
+            node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom)
+        ]
+        names = [name.name for node in nodes if (node.module or "").startswith("tissuq") for name in node.names]
+        assert not [name for name in names if name.startswith("_") and not name.endswith("__")], file
+
+
 @pytest.mark.slow
 def test_the_page_of_the_architecture_lists_the_files_as_they_are():
     table = runpy.run_path(str(ROOT.parents[1] / "docs" / "architecture_table.py"))

@@ -11,4 +11,4 @@ def test_files_of_one_name_have_a_copy_each():
     copies = Copies()
     named = [copies.of_code(text) for text in ("a/model.py:force", "b/model.py:force", "a/model.py:depth")]
     assert named == ["input/model.py:force", "input/2-model.py:force", "input/model.py:depth"]
-    assert copies.files == {"input/model.py": Path("a/model.py"), "input/2-model.py": Path("b/model.py")}
+    assert copies == {"input/model.py": Path("a/model.py"), "input/2-model.py": Path("b/model.py")}

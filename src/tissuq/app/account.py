@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["account", "modes_of_specimens"]
-
 MAX_POINTS = 1500
 """Points of a curve that are drawn."""
 MAX_ANSWERS, MAX_SHOWN = 12, 6

@@ -9,8 +9,6 @@ from typing import Any
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of
 
-__all__ = ["Repeat", "command", "fit_lines", "reading_words"]
-
 Repeat = dict[str, str]
 """A ``shell`` command and lines of ``python``."""
 OF_FILES = ("file", "name", "specimen", "direction", "condition", "noise_sd")
@@ -101,14 +99,12 @@ def _fit_options(settings: Mapping[str, Any], unit: str) -> Iterator[tuple[str, 
 
 def _read(test: Mapping[str, Any]) -> str:
     """Return the Python that reads a test."""
-    options = [f"{name}={_plain(value)!r}" for name, value in test.items() if name not in OF_FILES and _says(value)]
+    options = [
+        f"{name}={_plain(value)!r}" for name, value in test.items() if name not in OF_FILES and value not in (None, {})
+    ]
     labels = [f"{name}={test[name]!r}" for name in ("specimen", "direction", "condition") if test.get(name)]
     read = f"tq.read({', '.join([repr(test['file']), *options])})"
     return f"{read}.labelled({', '.join(labels)})" if labels else read
-
-
-def _says(value: Any) -> bool:
-    return value is not None and value != {}
 
 
 def _plain(value: Any) -> Any:

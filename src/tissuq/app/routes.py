@@ -19,8 +19,6 @@ from tissuq.app.sessions import MAX_FILE, MEGABYTE, Session, Sessions, store
 from tissuq.app.tasks import TASKS
 from tissuq.errors import TissuqError
 
-__all__ = ["STATIC", "routes"]
-
 STATIC = Path(__file__).parent / "static"
 REPORT_POLICY = (
     "sandbox allow-scripts allow-modals; default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
@@ -114,14 +112,10 @@ async def _begin(request: Request, sessions: Sessions) -> Response:
     if task not in TASKS or not isinstance(values, dict):
         return JSONResponse({"error": f"there is no task '{task}' with such values."}, 400)
     files = values.get("files", [])
-    if not isinstance(files, list) or not set(map(_file_of, files)) <= set(session.files):
+    # a test is named FILE#TEST
+    if not isinstance(files, list) or not {str(name).partition("#")[0] for name in files} <= set(session.files):
         return JSONResponse({"error": "one of these files is not here any more: drop it again."}, 400)
     return JSONResponse({"task": session.begin(sessions.workers, task, values)})
-
-
-def _file_of(name: Any) -> str:
-    """Return the file in which a test is that is named FILE#TEST."""
-    return str(name).partition("#")[0]
 
 
 async def _stop(request: Request, sessions: Sessions) -> Response:

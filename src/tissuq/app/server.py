@@ -23,8 +23,6 @@ from tissuq.app.sessions import GRACE, Sessions
 from tissuq.app.workers import Workers
 from tissuq.errors import InputError
 
-__all__ = ["Guard", "serve"]
-
 LOOPBACK = "127.0.0.1"
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Ctrl-C, a request to terminate, and a terminal that was closed, which Windows has not."""

@@ -17,8 +17,6 @@ from tissuq.app.workers import News, Workers
 from tissuq.errors import InputError
 from tissuq.studies.settings import is_inside
 
-__all__ = ["GRACE", "MAX_FILE", "MAX_TOTAL", "Session", "Sessions", "harmless_name", "store"]
-
 GRACE = 15.0
 """Seconds after which a session ends whose page has gone."""
 MAX_SESSIONS = 50
@@ -98,6 +96,11 @@ class Session:
         if task := self.tasks.get(number):
             task.cancel()
 
+    def stay(self) -> None:
+        """Do not end, though the page was not heard of for a while."""
+        if self.end is not None:
+            self.end.cancel()
+
     async def heard(self, start: int) -> AsyncIterator[tuple[int, dict[str, Any]]]:
         """Iterate over the news from a number on, as they come."""
         position = start
@@ -160,9 +163,7 @@ class Sessions:
     def listen(self, session: Session) -> None:
         """Count a page that listens to a session's news."""
         session.listeners += 1
-        if session.end is not None:
-            session.end.cancel()
-            session.end = None
+        session.stay()
 
     def leave(self, session: Session) -> None:
         """Count that page no more; the last one's session ends soon unless it comes back."""
@@ -173,8 +174,7 @@ class Sessions:
     def end(self, session: Session) -> None:
         """Stop the work of a session and delete its files."""
         self._by_name.pop(session.name, None)
-        if session.end is not None:
-            session.end.cancel()
+        session.stay()
         tasks = list(session.tasks.values())
         for task in tasks:
             task.cancel()
@@ -187,8 +187,7 @@ class Sessions:
             shutil.rmtree(session.folder, ignore_errors=True)
 
     def _end_in(self, session: Session, seconds: float) -> None:
-        if session.end is not None:
-            session.end.cancel()
+        session.stay()
         session.end = asyncio.get_running_loop().call_later(seconds, self.end, session)
 
     async def close(self) -> None:

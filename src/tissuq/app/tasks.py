@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from tissuq.report.result import Result
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["TASKS", "Say", "warm_up"]
-
 Say = Callable[[str, Any], None]
 """Is told what has come of a task so far: the kind of news, and plain data."""
 RUNS, CARDS = Path("runs"), Path("cards")
@@ -141,7 +139,8 @@ def predict(request: Mapping[str, Any], say: Say) -> None:
     target = RUNS / f"{run.name}-{prediction.mode.name}"
     written = _written("predict", target, partial(prediction_result, prediction, settings, target), say)
     points, table = settings.points_of(prediction.mode.name), band_table(prediction)
-    python = [*_imports(points), f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'
+    python = [*["import numpy as np"] * (points is not None), "import tissuq as tq", "",
+              f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'
               f"{_points_in_python(settings, points)})", "print(prediction.table)"]  # fmt: skip
     say(
         "done",
@@ -286,10 +285,6 @@ def _run_name(request: Mapping[str, Any]) -> str:
     if name in ("", ".."):
         raise InputError("no run was named.")
     return name
-
-
-def _imports(points: Any) -> list[str]:
-    return [*(["import numpy as np"] if points is not None else []), "import tissuq as tq", ""]
 
 
 def _points_in_python(settings: Any, points: Any) -> str:

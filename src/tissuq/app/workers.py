@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 
 from tissuq.errors import TissuqError
 
-__all__ = ["News", "Workers"]
-
 SPAWNED = multiprocessing.get_context("spawn")  # a fork of a process with threads may hang
 LIGHT = ("choices", "inspect")
 """Tasks that take a moment and need neither JAX nor Matplotlib."""

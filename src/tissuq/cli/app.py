@@ -14,8 +14,6 @@ from tissuq.cli.command import Command
 from tissuq.cli.progress import INTERRUPTED, TERMINATED, Stopped, end_on_request
 from tissuq.errors import TissuqError
 
-__all__ = ["app", "main"]
-
 
 class Commands(TyperGroup):
     """The commands, which help lists by what they are for."""

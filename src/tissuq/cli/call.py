@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from tissuq.report.result import Record, Result
     from tissuq.studies.finite_element_settings import ModelSettings
 
-__all__ = [
-    "SCHEDULER", "Call", "Campaign", "Configured", "IntoFolder", "LawOfRun", "OfRun", "Running", "SolverOptions",
-    "Verbosity", "Written", "check_folder", "not_converged", "write_campaign_recipe",
-]  # fmt: skip
-
 SCHEDULER = "Address of a Dask scheduler to use instead, or slurm:memory=4GB,walltime=02:00:00 for batch jobs."
 
 
@@ -143,14 +138,13 @@ class Call(Generic[Kind, How]):
     @cached_property
     def settings(self) -> Kind:
         """The settings, those that were typed before those in a file."""
-        return self.loaded()
-
-    def loaded(self, rivals: tuple[str, ...] = (), **changes: Any) -> Kind:
-        """Return the settings with changes to what was typed; of rivals only one can be set."""
-        return self.loaded_as(self.kind, rivals, **changes)
+        return self.loaded_as(self.kind)
 
     def loaded_as(self, kind: type[Whole], rivals: tuple[str, ...] = (), **changes: Any) -> Whole:
-        """Return `loaded` settings of another class, which may add what only a file can say."""
+        """Return the settings with changes to what was typed; of rivals only one can be set.
+
+        ``kind`` may be another class, which adds what only a file can say.
+        """
         return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
 
     def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:

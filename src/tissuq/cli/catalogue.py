@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.model.discrepancy import Discrepancy
 
-__all__ = ["check", "datasets", "discrepancies", "materials", "modes", "schema", "schema_of"]
-
 LONG = 70
 """Characters of a formula from which its source stands on a line of its own."""
 

@@ -18,8 +18,6 @@ from tissuq.cli.progress import Monitor, stopping
 from tissuq.studies.option import Settings, Slot, slots_of, stated
 from tissuq.studies.settings import imported, load_settings
 
-__all__ = ["CONFIGURED", "FORMER_NAMES", "Command", "command", "settings_of", "todays_names"]
-
 FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "paper": {"--points": "--measurements", "--sampler": "--method"},

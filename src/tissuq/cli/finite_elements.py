@@ -17,8 +17,6 @@ from tissuq.studies.option_texts import once_each
 if TYPE_CHECKING:
     from tissuq.studies.ensemble import PreparedEnsemble
 
-__all__ = ["ensemble", "structure"]
-
 FINER_MESH = "finer-mesh"
 """What the copy of a finer mesh is called."""
 
@@ -154,7 +152,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
     for example, value in (("--replace NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):
         if call.config is None and not value:
             raise InputError(f"give {example}: what the model is asked for.")
-    settings = call.loaded(model=model, materials=materials or None)
+    settings = call.loaded_as(call.kind, model=model, materials=materials or None)
     call.check_named_again(settings, is_dry=call.how.dry_run)
     return settings
 

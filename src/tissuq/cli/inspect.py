@@ -18,8 +18,6 @@ from tissuq.studies.option import argument, option
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
 
-__all__ = ["ask_about", "inspect"]
-
 Tests = list[tuple[dict[str, Any], "Reading"]]
 
 MOST_ANSWERS = 12

@@ -18,8 +18,6 @@ from tissuq.studies.settings import seen_from
 if TYPE_CHECKING:
     from tissuq.posterior.drawn_materials import Sampling
 
-__all__ = ["design", "export", "predict"]
-
 
 @command(PredictionSettings, OfRun, out="Folder for the prediction [RUN-MODE, beside the run].")
 def predict(call: Call[PredictionSettings, OfRun]) -> None:
@@ -61,7 +59,7 @@ def design(call: Call[DesignSettings, OfRun]) -> None:
         return str(name) if is_from_here else seen_from(call.beside, name)
 
     typed = tuple(with_folder(name, beside_settings) for name in call.stated.get("targets", ()))
-    settings = call.loaded(run=beside_settings(stated) if stated else None, targets=typed or None)
+    settings = call.loaded_as(call.kind, run=beside_settings(stated) if stated else None, targets=typed or None)
     run = (call.beside / settings.run).resolve()
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=call.beside / settings.run)
 

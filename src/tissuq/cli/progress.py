@@ -19,8 +19,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-__all__ = ["INTERRUPTED", "LOG", "TERMINATED", "Monitor", "Stopped", "end_on_request", "stopping"]
-
 LOG = "tissuq.log"
 """The file of a run that says how it came about."""
 PATIENCE = 3.0

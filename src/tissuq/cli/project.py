@@ -12,8 +12,6 @@ from tissuq.errors import InputError
 if TYPE_CHECKING:
     from tissuq.studies.installation import Extra
 
-__all__ = ["app", "doctor", "init"]
-
 
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder to write it into, new or empty.")] = Path("tissuq-example"),

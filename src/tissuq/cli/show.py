@@ -15,8 +15,6 @@ from tissuq.studies.settings import DAMAGE
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compare", "show"]
-
 LONGEST = 120
 """Seconds that the browser may take to print a page."""
 

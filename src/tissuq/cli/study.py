@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from tissuq.report.result import Result
     from tissuq.studies.stream import Campaign as CampaignOfTasks
 
-__all__ = ["paper", "study"]
-
 study = typer.Typer(name="study", no_args_is_help=True, rich_markup_mode=None, help="Campaigns over many data sets.")
 
 

@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 
 from tissuq.arrays import BoolArray
 
-__all__ = ["REVERSAL", "turning_points", "unloading"]
-
 REVERSAL = 0.1
 """Share of the range of stretches by which a test must go back for a new branch to begin."""
 FEWEST = 4

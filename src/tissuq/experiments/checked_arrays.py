@@ -18,19 +18,6 @@ from tissuq.experiments.units import StressUnit, stress_unit
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "FOUR_DIGITS",
-    "LARGE_STRETCH",
-    "agree",
-    "check_no_percent",
-    "checked",
-    "checked_points",
-    "headed",
-    "in_mpa",
-    "in_unit",
-    "stress_in_mpa",
-]
-
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken, or percent are meant."""
 LEAST_PERCENT = 30.0

@@ -17,9 +17,6 @@ from tissuq.experiments.modes import LoadingMode, Path
 from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import stress_unit
 
-__all__ = ["Curve", "draw_curves", "small_svg"]
-
-
 MAX_WIDTH_OF_MEANS = 0.05
 """Of a control over its range, within half of the groups of measurements that are averaged, and between two."""
 MAX_GROUPS_FACTOR = 2

@@ -21,8 +21,6 @@ from tissuq.experiments.modes.path import UNMEASURED
 from tissuq.experiments.units import StressUnit
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["Experiment"]
-
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Experiment:

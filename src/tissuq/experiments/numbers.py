@@ -7,20 +7,6 @@ from math import isfinite, nan
 from textwrap import fill
 from typing import Any
 
-__all__ = [
-    "CROSS",
-    "GROUPED",
-    "MEAN_WITH_SPREAD",
-    "NUMBER",
-    "PRODUCT",
-    "number_and_unit",
-    "number_in",
-    "sides_and_unit",
-    "unbroken",
-    "without_marks",
-    "wrapped",
-]
-
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 GROUPED = {
     ",": re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d*)?"),

@@ -8,8 +8,6 @@ from typing import Any
 
 from tissuq.errors import InputError
 
-__all__ = ["is_quantity", "stress_factor", "unit_of"]
-
 LONGEST_UNIT = 40
 """Characters."""
 UNIT_EXPRESSION = re.compile(

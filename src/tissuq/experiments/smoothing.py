@@ -9,9 +9,6 @@ import numpy as np
 
 from tissuq.arrays import FloatArray, IndexArray
 
-__all__ = ["Smoothed", "scatter", "smoothed"]
-
-
 MAX_KNOTS = 2000
 """Number of different stretches at most between which a curve is smoothed."""
 MIN_KNOTS = 5

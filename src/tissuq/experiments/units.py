@@ -11,28 +11,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.numbers import number_and_unit, sides_and_unit
 from tissuq.experiments.pint_units import stress_factor
 
-__all__ = [
-    "ANGLE",
-    "AREA",
-    "BRACKETS",
-    "FORCE",
-    "FORCE_PER_WIDTH",
-    "LENGTH",
-    "MASSES",
-    "PIXELS",
-    "PRESSURE",
-    "RATE",
-    "TIME",
-    "TORQUE",
-    "Quantity",
-    "StressUnit",
-    "looks_like_unit",
-    "measured_in",
-    "strain_factor",
-    "stress_unit",
-    "stress_units_in",
-]
-
 COMMON_STRESS_UNITS = {
     "Pa": 1e-6,
     "hPa": 1e-4,

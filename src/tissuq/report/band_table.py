@@ -17,8 +17,6 @@ from tissuq.report.tables import significant
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["LABELS", "OF_RANGES", "SHARES", "Bands", "handy_unit", "percent_of"]
-
 UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
 SHARES = {
     "parameters": BAND, "discrepancy": TRUTH, "extrapolation": SERIES[2], "test_scale": SERIES[3], "mesh": SERIES[4],

@@ -19,12 +19,11 @@ from tissuq.report.calibration_figures import band_figure, check_figure, margina
 from tissuq.report.calibration_in_words import finding_of, names_of, next_step_of, uses_of_calibration
 from tissuq.report.inputs import Copies
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT
-from tissuq.report.tables import Row, interval, known_number, significant
+from tissuq.report.tables import Row, interval, known_number, rows_of, significant
 from tissuq.report.writer import posterior_files
-from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy, Measured
-
-__all__ = ["calibration_result"]
+from tissuq.studies.calibration import CalibrationStudy, Measured
+from tissuq.studies.calibration_settings import CalibrationSettings
+from tissuq.studies.settings import INPUT
 
 WORST_RUNS = 8
 """Rows of the page's table of runs that were left out."""
@@ -64,7 +63,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     """
     calibration, settings = study.calibration, study.settings
     copies, relocated = _copies(study, beside)
-    files = copies.files | _tables(study) | {"calibration.nc": calibration.save}
+    files = copies | _tables(study) | {"calibration.nc": calibration.save}
     if study.posterior is not None:
         files |= posterior_files({NoDiscrepancy.name: study.posterior})
     model, runs = study.forward.name, len(calibration.runs)
@@ -119,7 +118,7 @@ def _copies(study: CalibrationStudy, beside: Path) -> tuple[Copies, dict[str, An
     for folder, (_, forward) in zip(_folders(len(decks)), decks, strict=True):
         deck, stored = forward.read_deck, f"{folder}/{MODEL}"
         of_model = {name: deck.root / name for name in deck.files} | extra_files(deck, forward.also, Path())
-        copies.files |= {f"{stored}/{name}": file for name, file in of_model.items()}
+        copies.update({f"{stored}/{name}": file for name, file in of_model.items()})
         models.append(f"{stored}/{deck.main}")
         also = [stored_place(deck, Path(file)) for file in forward.also]
         also_copies += [file if Path(file).is_absolute() else f"{folder}/{file}" for file in also]
@@ -163,21 +162,15 @@ def _tables(study: CalibrationStudy) -> dict[str, Any]:
     runs = calibration.runs
     parameters = dict(zip(runs.symbols, runs.points.T, strict=True))
     outputs = {f"output_{number}": column for number, column in enumerate(runs.outputs.T, 1)}
-    numbers = _rows(parameters | {"seconds": runs.seconds} | outputs)
+    numbers = rows_of(parameters | {"seconds": runs.seconds} | outputs)
     return {
         "summary.csv": rows,
         "summary.json": rows,
-        "prediction.csv": [name | row for name, row in zip(named, _rows(table), strict=True)],
+        "prediction.csv": [name | row for name, row in zip(named, rows_of(table), strict=True)],
         "leave_one_out.csv": calibration.leave_one_out.to_dict("records"),
         "sensitivity.csv": calibration.sensitivity.reset_index().to_dict("records"),
         "forward_runs.csv": [{**row, "error": error} for row, error in zip(numbers, runs.errors, strict=True)],
     }
-
-
-def _rows(columns: dict[str, Any]) -> list[Row]:
-    """Return columns as rows; nothing for nan."""
-    lists = [[None if np.isnan(value) else float(value) for value in column] for column in columns.values()]
-    return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
 def _parameters(study: CalibrationStudy) -> Table:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["band_figure", "check_figure", "marginals_figure"]
-
 EXACT = "#D55E00"
 MAX_COLUMNS = 3
 """Panels in a row of the figure of marginals."""

@@ -14,8 +14,6 @@ from tissuq.prediction.bands import Band
 from tissuq.result_warning import Severity, has_code, symbols_in
 from tissuq.studies.calibration import CalibrationStudy
 
-__all__ = ["finding_of", "names_of", "next_step_of", "uses_of_calibration"]
-
 LARGE_SHARE, TOO_LARGE_SHARE = 0.1, 0.5
 """Shares of the variance of a parameter that the emulator's error makes: beyond the first more runs are worth while,
 beyond the second an interval says more of the emulator than of the parameter."""

@@ -12,8 +12,6 @@ from tissuq.export.cards import distances_from_median
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.report.run_folder import run_folder
 
-__all__ = ["INDEX", "write_cards"]
-
 INDEX = "index.csv"
 
 

@@ -10,8 +10,6 @@ from tissuq.mechanics.material import Material, materials
 from tissuq.mechanics.named import FORMS
 from tissuq.parameters.parameter import Parameter
 
-__all__ = ["default_in_words", "materials_page", "modes_page"]
-
 MATERIALS_HEAD = """# Materials
 
 Written by `tissuq materials --markdown` from the classes; a test holds it up to date. W is the strain energy per

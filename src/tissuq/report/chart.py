@@ -22,9 +22,6 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands
 from tissuq.report.figures import described_curves
 
-__all__ = ["chart_data"]
-
-
 GRID_POINTS = 41
 """Stretches at which the bands of a mode that was not measured are drawn."""
 MAX_RATIO = 4.0

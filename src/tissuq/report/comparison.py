@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["EXPLANATIONS", "comparison_figure", "comparison_result", "comparison_table", "comparison_warnings"]
-
 EXPLANATIONS = (
     "Log Bayes factor: log evidence relative to the best fit. With other priors: its range when the prior scales of "
     "the discrepancies are divided or multiplied by four and the uniform priors of linear parameters are four times as "

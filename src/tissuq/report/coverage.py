@@ -13,17 +13,9 @@ from tissuq.validation.coverage import CoverageSettings, summarise, summarise_un
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["coverage_result", "coverage_table", "numbers_of_shares"]
-
 MIN_RELATIVE_ERROR = 1e-9
 """Monte Carlo error, relative to its number, below which it is rounding and shown as zero."""
-SETTING_HEADERS = {
-    "design": "design",
-    "strength": "strength",
-    "noise": "noise",
-    "family": "family",
-    "mode": "loading mode",
-}
+SETTING_HEADERS = {name: name for name in ("design", "strength", "noise", "family")} | {"mode": "loading mode"}
 OF_COVERAGE = {
     "fits": ("fits", "count"),
     "coverage": ("coverage", "percent"),

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["coverage_figure", "dots_by_row", "family_figure", "panel_grid", "shares_figure", "unseen_figure"]
-
 COLORS = SERIES
 CELL = ["design", "strength", "noise"]
 BAR_HALF_WIDTH = 1.96

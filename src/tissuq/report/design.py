@@ -18,14 +18,13 @@ from tissuq.next_test.ranking import TIED
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import said_by
 from tissuq.report.tables import significant
-from tissuq.studies.design import DesignSettings, DesignStudy
+from tissuq.studies.design import DesignStudy
+from tissuq.studies.run_settings import DesignSettings
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["design_figure", "design_result", "design_table"]
 
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
@@ -109,12 +108,12 @@ def design_figure(study: DesignStudy) -> Figure:
 
 def _figure(study: DesignStudy, targets: Sequence[Target], limit: int, width: float) -> Figure:
     shown = [_shown(_rows_of(study, target), limit) for target in targets]
-    letters = int(LETTERS_PER_INCH * width)
-    height = 1.5 + max(sum(0.1 + LINE * len(_lines(name, letters)) for name in table["candidate"]) for table in shown)
+    lines_of = partial(wrap, width=int(LETTERS_PER_INCH * width), break_on_hyphens=False)
+    height = 1.5 + max(sum(0.1 + LINE * len(lines_of(name)) for name in table["candidate"]) for table in shown)
     with new_figure(width, 0.4 + height * len(shown)) as figure:
         axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
         for axis, target, table in zip(axes, targets, shown, strict=True):
-            _panel(axis, study, target, table, letters)
+            _panel(axis, study, target, table, lines_of)
         marks: list[Any] = [axes[0].plot([], [], "o", color=color)[0] for color in (BAND, BEYOND, BASE)]
         words = ["within the measured I1 and I2", "beyond", "repeats of the tests of the data"]
         figure.legend(marks, words, loc="outside lower right", ncols=3 if width == WIDTH else 1, fontsize=9)
@@ -230,12 +229,10 @@ def _shown(table: pd.DataFrame, limit: int) -> pd.DataFrame:
     return ranked[ranked["is_repeat"].to_numpy() | (ranks < limit)]
 
 
-def _lines(name: str, letters: int) -> list[str]:
-    return wrap(name, letters, break_on_hyphens=False)
-
-
-def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame, letters: int) -> None:
-    """Draw the tests of one target, their names in lines of so many letters."""
+def _panel(
+    axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame, lines_of: Callable[[str], list[str]]
+) -> None:
+    """Draw the tests of one target, their names in lines."""
     sd_now, unit, heights = float(table["sd_now"].iloc[0]), table["unit"].iloc[0], np.arange(len(table))[::-1]
     for height, (_, row) in zip(heights, table.iterrows(), strict=True):
         sd_after, error = row["sd_after"], 2 * row["error"] * sd_now
@@ -244,7 +241,7 @@ def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame, 
         axis.plot([sd_after - error, sd_after + error], [height, height], color=INK, lw=1.2)
         axis.plot(sd_after, height, "o", color="white" if row["is_rough"] else color, mec=color, ms=6)
     axis.axvline(sd_now, color=INK, lw=1)
-    axis.set_yticks(heights, ["\n".join(_lines(name, letters)) for name in table["candidate"]])
+    axis.set_yticks(heights, ["\n".join(lines_of(name)) for name in table["candidate"]])
     axis.set_ylim(-0.7, len(table) - 0.3)
     axis.set_xlim(0, 1.04 * sd_now)
     axis.locator_params(axis="x", nbins=4)

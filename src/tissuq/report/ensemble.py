@@ -32,8 +32,6 @@ from tissuq.studies.ensemble import DRAWS, EnsembleStudy
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["copy_functions", "ensemble_result"]
-
 FUNCTIONS = "quantities"
 """Folder with copies of the files of the user's functions."""
 MUCH_BEYOND, FEW_DRAWS = 0.2, 64

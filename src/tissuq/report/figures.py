@@ -9,7 +9,8 @@ from tissuq.arrays import FloatArray
 from tissuq.assessment.extent import has_energy
 from tissuq.drawing.panels import columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
-from tissuq.drawing.style import BASE, TRUTH, new_figure, save_figure
+from tissuq.drawing.style import BASE, TRUTH, new_figure
+from tissuq.drawing.style import save_figure as save_figure
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import Described, described
@@ -19,13 +20,6 @@ from tissuq.posterior.posterior import Posterior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = [
-    "described_curves",
-    "marginal_figure",
-    "predictive_figure",
-    "save_figure",
-]
 
 
 WIDTHS = {1: 6.0, 2: 9.2, 3: 11.5}

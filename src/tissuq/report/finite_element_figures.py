@@ -26,11 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "band_over_time", "field_figure", "force_and_strain_figure", "force_figure", "moments", "quantity_figure",
-    "share_figure", "state_figure", "write_collection", "write_fields", "write_vtu",
-]  # fmt: skip
-
 MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
 

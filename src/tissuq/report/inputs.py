@@ -8,31 +8,19 @@ from typing import Any, NamedTuple
 
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics.user_law import LAW
-from tissuq.report.run_folder import INPUT
-from tissuq.studies.laws import LawSettings
+from tissuq.studies.fit_settings import LawSettings, SpecimenSettings
 from tissuq.studies.measured_file import MeasuredFile
-from tissuq.studies.specimen import SpecimenSettings
-
-__all__ = ["Copies", "Inputs", "inputs_of"]
+from tissuq.studies.settings import INPUT
 
 
-class Copies:
-    """Copies of the user's files in the folder of a run, so that it can be repeated.
-
-    Attributes
-    ----------
-    files : dict of str to Path
-        By the names of their copies.
-    """
-
-    def __init__(self) -> None:
-        self.files: dict[str, Path] = {}
+class Copies(dict[str, Path]):
+    """The user's files by the names of their copies in the folder of a run, so that it can be repeated."""
 
     def of_file(self, file: Path, folder: str = INPUT, name: str = "") -> str:
         """Return what the copy of a file is called: its name or the given one, numbered if that is taken."""
         name, number = name or file.name, 1
         copy = f"{folder}/{name}"
-        while self.files.setdefault(copy, file) != file:
+        while self.setdefault(copy, file) != file:
             number += 1
             copy = f"{folder}/{number}-{name}"
         return copy
@@ -67,7 +55,7 @@ def inputs_of(settings: SpecimenSettings, experiment: Experiment, sources: Seque
     without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
     options = "".join(f" --material {name}" for name in names) if names != named else ""
     recipe = settings.model_copy(update=relocated)
-    return Inputs(copies.files, recipe, without | {"material"} if several_laws else without, options)
+    return Inputs(copies, recipe, without | {"material"} if several_laws else without, options)
 
 
 def _relocated(

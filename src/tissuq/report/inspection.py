@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["REGIONS", "curve_figure", "write_inspection"]
-
 LETTERS = 13
 """Size of letters in the figure of an inspection, which is looked at on small screens, too; points."""
 _BROAD: dict[str, Any] = {"ls": "-", "lw": 9, "alpha": 0.45, "solid_capstyle": "round"}

@@ -26,8 +26,6 @@ from tissuq.studies.laws import LawStudy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["columns_of_laws", "law_lead", "law_result", "law_table"]
-
 MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
 FEW_LAWS = 3

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-__all__ = ["computed_section", "data_section", "methods_section", "named", "specimens_section", "subject_of"]
-
 LONGEST_NAME = 40
 """Letters of the names of several tests in a title; of more these are counted."""
 PRIORS = (

@@ -22,34 +22,29 @@ from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, FORMULATIONS, Fitted
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["paper_result"]
-
 MPA = StressUnit("MPa", 1.0)
-GROUPS = {
-    1: ("none", "constant", "linear", "quadratic"),
-    3: ("none", "mooney-rivlin", "yeoh"),
-    5: ("none", "gp"),
-}
-"""The formulations of each pair of the paper's figures, by the number of the first of the pair."""
 PAGES = {
     1: (
+        ("none", "constant", "linear", "quadratic"),
         "Polynomial discrepancies",
         "The error S is free, so the band can grow until it holds about 95 % of the data whatever the mean does. Where "
         "the predicted median stays near that of the fit without discrepancy (dotted) and away from the measurements, "
         "the band covers the data without explaining them.",
     ),
     3: (
+        ("none", "mooney-rivlin", "yeoh"),
         "Hyperelastic discrepancies",
         "The Yeoh mean contains the truth, so its C10 keeps its meaning; the Mooney-Rivlin term does not, and its C01 "
         "absorbs part of the initial stiffness.",
     ),
     5: (
+        ("none", "gp"),
         "A Gaussian process",
         "A process follows the data as far as the prior of its amplitude c allows; beyond that C10 has to adapt. The "
         "table of ranges and bounds below shows how much the verdict depends on this.",
     ),
 }
-"""Title of each group, and what it shows."""
+"""The formulations of each pair of the paper's figures, its title, and what it shows, by the number of the first."""
 FIGURE_7 = (
     "Figure 7 (numbered as in the paper). Marginal posteriors of C10: density (each to its own scale), 95 % interval "
     "(bar) and median (dot). Blue: the interval holds the true value; grey: it does not."
@@ -141,7 +136,7 @@ def _sections(study: PaperStudy) -> tuple[Section, ...]:
         "prints neither the number of points nor the range nor the bounds of its priors; all but one of its claims are "
         "confirmed together at 30 points on [0.5, 4.25] with these priors, the defaults of this study.",
     )
-    groups = [Section(title, (words, *_pair(study, number, title))) for number, (title, words) in PAGES.items()]
+    groups = [_group(study, number, *page) for number, page in PAGES.items()]
     sections = [Section("The question", question), *groups, Section("The paper's claims, one by one", _verdicts(study))]
     sections.append(Section("What the ranking depends on", _ranges(study)))
     if study.sampled:
@@ -155,19 +150,20 @@ def _sections(study: PaperStudy) -> tuple[Section, ...]:
     return (*sections, Section("Every parameter", (parameter_table(_posteriors(study.main)),)), took)
 
 
-def _pair(study: PaperStudy, number: int, title: str) -> tuple[Block, ...]:
-    """Return the two figures of a group: with the discrepancy, and the model alone."""
-    shown = {name: study.main[name].posterior for name in GROUPS[number]}
+def _group(study: PaperStudy, number: int, formulations: tuple[str, ...], title: str, text: str) -> Section:
+    """Return what a group shows, with its two figures: with the discrepancy, and the model alone."""
+    shown = {name: study.main[name].posterior for name in formulations}
     condition = ", the process conditioned on the data" if "gp" in shown else ""
     with_it = f"Figure {number}. Predictive check with the discrepancy (eq. 27){condition}."
     without_it = f"Figure {number + 1}. The model alone, without the discrepancy's share (eq. 28), same data."
     words = title.lower()
-    return (
+    return Section(title, (
+        text,
         Picture(f"figure{number}", partial(_predictive, study, shown, discrepancy=True), f"Predictive bands: {words}",
                 with_it),
         Picture(f"figure{number + 1}", partial(_predictive, study, shown, discrepancy=False),
                 f"Bands of the model alone: {words}", without_it),
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def _predictive(study: PaperStudy, shown: dict[str, Any], *, discrepancy: bool) -> Figure:

@@ -40,19 +40,16 @@ from tissuq.report.population_in_words import (
     patient_in_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, rows_of, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
-from tissuq.studies.settings import DATA
+from tissuq.studies.settings import DATA, INPUT
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tissuq.model.tolerances import Tolerances
     from tissuq.population import Population
-
-__all__ = ["population_result"]
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""
@@ -152,7 +149,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),
-        files=files | copies.files | posterior_files({PATIENT: population.patient}),
+        files=files | copies | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from tissuq.population import Population
 
-__all__ = ["Bands", "Measured", "headline_figure", "patient_figure", "specimens_figure"]
-
 Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
 """Stress of a new specimen with the model error, and of the material alone."""
 Measured: TypeAlias = tuple[LoadingMode, int]

@@ -20,8 +20,6 @@ from tissuq.studies.population import PopulationStudy
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["effects_of_covariates", "needed_of", "needed_table_of", "next_step_of", "patient_in_words"]
-
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
 

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
     from tissuq.studies.run_settings import PredictionSettings
 
-__all__ = ["band_table", "prediction_figure", "prediction_result", "score_table"]
-
 SCORES = ("crps", "interval_score")
 """Columns that are stresses."""
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
@@ -112,7 +110,7 @@ def prediction_result(
         tables=tuple(tables),
         sections=_sections(prediction),
         warnings=tuple(prediction.warnings),
-        files=files | copies.files,
+        files=files | copies,
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
 

@@ -27,20 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pydantic import BaseModel
 
-__all__ = [
-    "MAX_NUMBERS",
-    "RESULT",
-    "Block",
-    "Number",
-    "Picture",
-    "Preformatted",
-    "Record",
-    "Result",
-    "Section",
-    "Table",
-    "few_and_others",
-]
-
 RESULT = "result.json"
 """The file with the record of a result."""
 MAX_NUMBERS = 3

@@ -15,8 +15,6 @@ from tissuq.validation.sbc import SbcSettings, ecdf_band, probabilities_of, summ
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "sbc_result"]
-
 MAX_COLUMNS = 4
 """Panels in a row of the figure."""
 CAPTION = (

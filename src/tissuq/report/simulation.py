@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["simulation_result"]
-
 OF_MEASUREMENT = "the variance of a new measurement, whose noise is not in the band"
 MUCH_BEYOND = 0.2
 """Share of the strain energy beyond the measurements from which these are to be extended."""

@@ -14,19 +14,13 @@ from tissuq.assessment.uses import COMPUTING, Use, Verdict
 from tissuq.errors import InputError
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.report.result import RESULT
-from tissuq.report.run_folder import INPUT, RECIPE
 from tissuq.report.writer import read_record
 from tissuq.result_warning import ResultWarning, Severity
 from tissuq.studies.earlier_run import POSTERIORS, answering
-from tissuq.studies.settings import damage_reported
+from tissuq.studies.settings import INPUT, RECIPE, damage_reported
 
 if TYPE_CHECKING:
     from tissuq.finite_elements.case import Case
-
-__all__ = [
-    "LAW_OF_USE", "SOURCE", "Said", "check_mesh", "check_source", "copy_mesh", "copy_source", "said_by", "stored_mesh",
-    "uses_of",
-]  # fmt: skip
 
 SOURCE = "source"
 """The folder with the copies."""

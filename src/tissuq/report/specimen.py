@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-__all__ = ["specimen_answer", "specimen_result"]
-
 MARGINALS = "Marginal posteriors of {name}: density (each to its own scale), 95 % interval (bar) and median (dot)."
 CHECKS = (
     "A good predictive check (many measurements inside the band) says nothing about the parameter: a flexible "

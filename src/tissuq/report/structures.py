@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["structures_result"]
-
 COLUMNS: dict[str, Callable[[Any], str]] = {
     "truth": itemgetter("truth"),
     "structure": itemgetter("structure"),

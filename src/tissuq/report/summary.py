@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
 from tissuq.experiments.units import StressUnit
@@ -19,11 +20,6 @@ from tissuq.report.tables import (
     table_files,
 )
 
-__all__ = [
-    "FOLLOWS", "SAME_STATES", "held_out_files", "held_out_table", "parameter_rows", "parameter_table",
-    "stability_cells", "stability_rows", "stability_section", "summary_row", "summary_table", "summary_tables",
-]  # fmt: skip
-
 HOW_TO_READ = (
     "Intervals are the shortest that hold 95 %. In band, alone: share of measurements inside the 95 % band with the "
     "discrepancy, and inside that of the material alone.{stability} A good predictive check does not mean "
@@ -39,10 +35,6 @@ SAME_STATES = (
     "Tension in one mode may be compression in another: what is pressed to 0.6 along two axes (equibiaxial "
     "compression) grows to 1 / 0.6² = 2.8 along the third, for its volume stays: the state of uniaxial tension to 2.8."
 )
-STABILITY_HEADERS = [
-    "discrepancy", "loading mode", "stretch", "stable throughout, probability", "lost in compression at",
-    "lost in tension at",
-]  # fmt: skip
 STABLE_MEANS = (
     "Stable means that from rest onward the greater principal stress lies along the greater stretch (Baker-Ericksen), "
     "every small change of stress does positive work (Drucker), and the engineering stress rises with the stretch. It "
@@ -91,10 +83,7 @@ def summary_row(
 
 def headline_of(row: Row) -> str:
     """Return the parameter whose posterior the row of a formulation gives."""
-    names = [name.removesuffix("_mean") for name in row if name.endswith("_mean")]
-    if not names:
-        raise KeyError("the row names no parameter")
-    return names[0]
+    return next(name.removesuffix("_mean") for name in row if name.endswith("_mean"))
 
 
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
@@ -220,24 +209,21 @@ def stability_cells(posterior: Posterior) -> Row:
 
 def stability_section(rows: list[Row]) -> Section:
     """Return the rows of stability for people; no stretch where it is hardly ever lost."""
-    cells = [
-        [
-            row["formulation"],
-            row["mode"],
-            f"{row['stretch_low']:.3g} to {row['stretch_high']:.3g}",
-            percent(row["stable"]),
-            *(
-                stretch_in_words(*(row[f"lost_{side}_{name}"] for name in ("median", "low", "high")))
-                if row[f"lost_{side}_probability"] > MIN_LOSS_PROBABILITY
-                else ""
-                for side in ("below", "above")
-            ),
-        ]
-        for row in rows
-    ]
-    return Section(
-        "Where it is stable", (STABLE_MEANS, Table(STABILITY_HEADERS, cells, text_columns=(1,)), SAME_STATES)
-    )
+
+    def lost(row: Row, side: str) -> str:
+        ends = (row[f"lost_{side}_{name}"] for name in ("median", "low", "high"))
+        return stretch_in_words(*ends) if row[f"lost_{side}_probability"] > MIN_LOSS_PROBABILITY else ""
+
+    columns: dict[str, Callable[[Row], str]] = {
+        "discrepancy": itemgetter("formulation"),
+        "loading mode": itemgetter("mode"),
+        "stretch": lambda row: f"{row['stretch_low']:.3g} to {row['stretch_high']:.3g}",
+        "stable throughout, probability": lambda row: percent(row["stable"]),
+        "lost in compression at": lambda row: lost(row, "below"),
+        "lost in tension at": lambda row: lost(row, "above"),
+    }
+    table = Table.of(rows, columns, text_columns=(1,))
+    return Section("Where it is stable", (STABLE_MEANS, table, SAME_STATES))
 
 
 def held_out_files(rows: Sequence[Row], headline: str, unit: StressUnit) -> dict[str, list[Row]]:

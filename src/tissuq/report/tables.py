@@ -7,15 +7,11 @@ import json
 from collections.abc import Mapping, Sequence
 from math import floor, inf, isfinite, log10
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from tissuq.arrays import FloatArray
 from tissuq.experiments.units import StressUnit
-
-__all__ = [
-    "Row", "in_unit_of", "interval", "known_number", "percent", "rows_of", "significant", "stretch_in_words",
-    "table_files", "with_named_units", "write_csv", "write_json",
-]  # fmt: skip
 
 Row = dict[str, Any]
 
@@ -50,10 +46,10 @@ def table_files(name: str, rows: Sequence[Row], columns: Sequence[str], unit: St
     return {f"{name}.csv": with_named_units(rows, columns, unit), f"{name}.json": in_unit_of(rows, columns, unit)}
 
 
-def rows_of(columns: Mapping[str, FloatArray], labels: Row) -> list[Row]:
-    """Return columns of numbers as rows, each with labels before them."""
-    values = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return [labels | dict(zip(columns, row, strict=True)) for row in values]
+def rows_of(columns: Mapping[str, FloatArray], labels: Mapping[str, Any] = MappingProxyType({})) -> list[Row]:
+    """Return columns of numbers as rows, each with labels before them; None for numbers that are missing."""
+    values = zip(*(map(known_number, column.tolist()) for column in columns.values()), strict=True)
+    return [{**labels, **dict(zip(columns, row, strict=True))} for row in values]
 
 
 def known_number(number: float) -> float | None:

@@ -12,8 +12,6 @@ from tissuq.experiments.numbers import wrapped
 from tissuq.report.result import Record, TableRecord, UseRecord, few_and_others
 from tissuq.result_warning import Severity, in_shell
 
-__all__ = ["print_explanations", "print_next", "print_result", "print_rows", "print_uses", "print_warnings"]
-
 TEXT_WIDTH = 96
 """Letters in a line of prose, and at least in one of a table."""
 GAP = 2

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["tissue_result"]
-
 SHARES = {"inside_50": "in 50 %", "inside_80": "in 80 %", "inside_95": "in 95 %", "useful": "useful"}
 RATIOS = {"half_width": "half width", "error": "error", "score": "score"}
 TESTS = {

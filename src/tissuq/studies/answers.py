@@ -15,8 +15,6 @@ from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of, stated
 from tissuq.studies.settings import imported
 
-__all__ = ["DIMENSIONS", "Answer", "answers_in", "options_in", "with_options"]
-
 READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
 """How every option of reading is taken, by its name; that which says no stands for the same setting."""
 READING |= {slot.option.negative: slot for slot in READING.values() if slot.option.negative}
@@ -26,12 +24,9 @@ DIMENSIONS = tuple(name for name, slot in READING.items() if slot.path[0] == "di
 """Options that are sizes."""
 TYPED = (*DIMENSIONS, "axial-stretch")
 """Options whose values a person must type: of which messages show examples."""
-OPTION = re.compile(r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+)))?""")
 OTHER_ROLES = re.compile(r"\(or ((?:\w+=(?:, | or )?)+)\)")
 """As in ``--column stress=NAME (or force=)``."""
 PLACEHOLDERS = ("NAME", "NUMBER")
-WORDS = frozenset(["out", "for", "or", "and", "if", "to", "with", "instead", "once"])
-"""What may follow an option in a sentence, and is no value."""
 CHOICES = {
     "mode": "tissuq.experiments.modes:loading_modes",
     "strain-type": "tissuq.experiments.reading.measures:STRAIN_MEASURES",
@@ -82,9 +77,11 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
     >>> [answer.text for answer in found]
     ['--stress-unit kPa', '--stress-unit MPa']
     """
+    from tissuq.experiments.reading.python_form import OPTION, WORDS
+
     answers: list[Answer] = []
     end = -1
-    for match in OPTION.finditer(message):
+    for match in re.finditer(OPTION, message):
         name, value = match["name"], (match["value"] or "").rstrip(".:")
         if name not in READING:
             continue

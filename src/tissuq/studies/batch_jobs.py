@@ -9,8 +9,6 @@ from typing import Any
 
 from tissuq.errors import InputError
 
-__all__ = ["QUEUES", "is_queue", "workers_in_queue"]
-
 QUEUES = {"slurm": "SLURMCluster", "pbs": "PBSCluster", "lsf": "LSFCluster", "sge": "SGECluster"}
 """The class of dask-jobqueue for every queue."""
 COUNTS = ("cores", "processes")

@@ -38,8 +38,6 @@ from tissuq.studies.stream import (
     write_whole,
 )  # fmt: skip
 
-__all__ = ["calibrate", "runs_of"]
-
 
 def calibrate(
     control: ArrayLike | Mapping[str, ArrayLike],
@@ -245,7 +243,8 @@ def _open(folder: Path, model: Forward, problem: Problem) -> None:
         different = [name for name, value in about.items() if recorded.get(name) != value]
         if not different:
             return
-        if not _have_all_failed(folder):
+        results = list(_results(folder))
+        if not results or not all(map(_has_failed, results)):
             raise InputError(
                 f"folder '{folder}' holds runs of another forward model or data (its {different[0]} differ): choose "
                 "another one, or remove it."
@@ -266,11 +265,6 @@ def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:
     for parent in missing[1:]:
         with suppress(OSError):
             parent.rmdir()
-
-
-def _have_all_failed(folder: Path) -> bool:
-    results = list(_results(folder))
-    return bool(results) and all(map(_has_failed, results))
 
 
 def _results(folder: Path) -> Iterator[dict[str, Any]]:

@@ -36,9 +36,6 @@ from tissuq.studies.earlier_run import load_law, priors_of
 from tissuq.studies.settings import DATA, INPUT, damage_reported
 from tissuq.studies.stream import Step, silent
 
-__all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
-
-
 PROPORTIONAL_BY_CHANCE = 4
 """Fewest measurements of which it shows that they are those of another file in another unit."""
 SAME_UNIT = 1e-9

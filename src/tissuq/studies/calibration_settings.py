@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from tissuq.emulation.forward import Forward
     from tissuq.parameters.priors import Prior
 
-__all__ = ["CalibrationSettings", "OfModel"]
-
 OWN = "Your own finite-element model"
 NUMBER = r"\d+\.?\d*"
 RANGE = re.compile(rf"{NUMBER}:{NUMBER}")
@@ -139,10 +137,9 @@ class CalibrationSettings(ModelSettings):
     skip_rows: int = option(0, "Lines to skip at the top of the file.", ge=0)
     seed: int = seed()
 
-    @field_validator("noise_sd", mode="before")
-    @classmethod
-    def _positive_or_unknown(cls, value: Any) -> Any:
-        return positive_or_unknown(value, "the unit of the measured values")
+    _positive_or_unknown = field_validator("noise_sd", mode="before")(
+        positive_or_unknown("the unit of the measured values")
+    )
 
     @model_validator(mode="before")
     @classmethod

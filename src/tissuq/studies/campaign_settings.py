@@ -13,11 +13,6 @@ from tissuq.studies.option import Settings, argument, option, seed
 from tissuq.studies.option_texts import priors, tolerances
 from tissuq.studies.settings import SizesOfErrors, imported
 
-__all__ = [
-    "CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions", "each_once",
-    "names_among",
-]  # fmt: skip
-
 NoiseKnown = Annotated[
     tuple[Literal["known", "unknown"], ...],
     BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),

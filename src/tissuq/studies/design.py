@@ -28,8 +28,6 @@ from tissuq.studies.settings import RECIPE, damage_reported, load_settings
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["DesignSettings", "DesignStudy", "run_design", "with_folder"]
-
 WELL_EXPLAINED = 0.9
 """Share of the variance of a quantity of a model from which nothing need be said of the rest."""
 PREFIX = "ensemble:"

@@ -19,12 +19,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.studies.settings import RECIPE, damage_reported, load_settings, setting_of
 
 if TYPE_CHECKING:
-    from tissuq.studies.specimen import SpecimenSettings
-
-__all__ = [
-    "POSTERIORS", "answering", "load", "load_law", "load_run", "load_without_discrepancy", "modes_of", "posteriors_in",
-    "priors_of", "recipe_of",
-]  # fmt: skip
+    from tissuq.studies.fit_settings import SpecimenSettings
 
 POSTERIORS = "posterior"
 """Subfolder of a run with a file for each of its posteriors."""

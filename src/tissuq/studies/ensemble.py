@@ -31,11 +31,6 @@ from tissuq.studies.stream import RESULTS, Step, forget_results, read_results, r
 if TYPE_CHECKING:
     from tissuq.posterior.drawn_materials import Sampling
 
-__all__ = [
-    "DRAWS", "FINER", "EnsembleSettings", "EnsembleStudy", "FinerModel", "PreparedEnsemble", "drawn_materials",
-    "forget_failures", "prepare_ensemble", "run_ensemble",
-]  # fmt: skip
-
 DRAWS = "draws"
 """Folder with a folder for each run."""
 RUN_FOLDER = re.compile(r"[a-z]+-[0-9]+")

@@ -9,8 +9,6 @@ from pathlib import Path
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
 
-__all__ = ["DATASETS", "write_example_project"]
-
 DATASETS = {"brain-cortex-uniaxial": "tension-compression.csv", "brain-cortex-shear": "shear.csv"}
 """Which built-in data sets the project holds, and the names of their files there."""
 

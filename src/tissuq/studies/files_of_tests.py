@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from tissuq.experiments.reading.inspection import Inspection
     from tissuq.experiments.reading.table import Table
 
-__all__ = ["files_of", "find_tests", "measured", "resolve", "run_name", "study_file", "tables_of", "tests_in_words"]
-
 OPTIONAL_FOR_TESTS = ("dimensions", "compression_positive")
 """Options that a test does without where another one needs them: an error where none does."""
 SELECTION = ("sheet", "table", "columns", "only", *OPTIONAL_FOR_TESTS)

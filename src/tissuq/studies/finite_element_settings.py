@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from tissuq.export import CardSettings
     from tissuq.finite_elements.case import Case
 
-__all__ = ["CardOptions", "EnsembleSettings", "ModelSettings", "SimulationSettings"]
-
 SOLVER, CARDS = "Solver", "Cards"
 MESH = "Error of the mesh"
 

@@ -22,7 +22,7 @@ from tissuq.studies.measured_file import (
     ReadingSettings,
 )
 from tissuq.studies.option import argument, option
-from tissuq.studies.option_texts import noises, pairs_of, priors, share
+from tissuq.studies.option_texts import aimed_share, noises, pairs_of, priors
 from tissuq.studies.settings import looked_up
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from tissuq.experiments.units import StressUnit
     from tissuq.mechanics import Material
     from tissuq.model.noise import Noise
-
-__all__ = ["ALL", "LawSettings", "PopulationSettings", "SpecimenSettings"]
 
 ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply; in place of laws: all."""
@@ -217,7 +215,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         "Also say how many specimens like these it takes until half the 95 % interval of the population's median, and "
         "that of a new specimen, is this share of the median, such as 10%.",
         takes=str,
-        parse=share("--aim"),
+        parse=aimed_share,
         gt=0,
         lt=inf,
     )

@@ -7,8 +7,6 @@ import shutil
 from dataclasses import dataclass
 from importlib import metadata
 
-__all__ = ["DEVELOPER_EXTRAS", "EXTRAS", "PROGRAMS", "Extra", "Package", "Program", "extras", "needed", "programs"]
-
 EXTRAS = {
     "ansys": "reads result files of ANSYS (tissuq ensemble and calibrate --model with .rst)",
     "app": "opens the local page in the browser (tissuq app)",

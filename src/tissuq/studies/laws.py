@@ -23,8 +23,6 @@ from tissuq.studies.fit_settings import LawSettings
 from tissuq.studies.specimen import priors_in_mpa, shared_options, warnings_of_files
 from tissuq.studies.stream import open_pool
 
-__all__ = ["LawSettings", "LawStudy", "run_laws"]
-
 SIGNIFICANT_ERRORS = 2.0
 """Standard errors of a difference of elpd beyond which it counts."""
 MIN_DIVIDED = 4

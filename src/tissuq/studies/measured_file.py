@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from tissuq.model.noise import Noise
     from tissuq.model.tolerances import Tolerances
 
-__all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
-
 READING = "Reading files"
 HELP_ON_AXIAL_STRETCH = (
     "Of a tube that was stretched along its axis, then inflated: length over undeformed length; to fit several files "
@@ -197,12 +195,9 @@ class FittedSettings(Settings):
         parse=tolerances,
     )
 
-    @field_validator("noise_sd", mode="before")
-    @classmethod
-    def _positive_or_unknown(cls, value: Any) -> Any:
-        return positive_or_unknown(
-            value, "the file's stress unit", "; noise of zero would make every measurement exact"
-        )
+    _positive_or_unknown = field_validator("noise_sd", mode="before")(
+        positive_or_unknown("the file's stress unit", "; noise of zero would make every measurement exact")
+    )
 
     @field_validator("noise", mode="before")
     @classmethod

@@ -15,11 +15,6 @@ from tissuq.parameters.checks import MAX_SEED
 from tissuq.studies.option_texts import pairs_of
 from tissuq.studies.settings import imported
 
-__all__ = [
-    "Option", "Settings", "Slot", "argument", "mesh_order", "only_rows", "option", "options_of", "sampling", "seed",
-    "slots_of", "stated",
-]  # fmt: skip
-
 
 class Settings(BaseModel):
     """Settings whose fields are declared by `option` and `argument`, or are for files alone."""

@@ -10,11 +10,6 @@ from typing import Any
 
 from tissuq.errors import InputError
 
-__all__ = [
-    "column", "noises", "number_or_text", "once_each", "pairs_of", "priors", "range_of", "sd_or_unknown",
-    "share", "tolerances",
-]  # fmt: skip
-
 
 def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return the pairs of a repeatable option as a dictionary, each name given once."""
@@ -96,16 +91,12 @@ def _without_unit(text: str) -> str:
     return f" If the file's stresses are in {unit}, type --noise-sd {number:g}." if unit else ""
 
 
-def share(option: str) -> Callable[[str], float]:
-    """Return what makes a number of a text like 10% or 0.1."""
-
-    def parse(text: str) -> float:
-        number, is_percent = _number_or_percent(text)
-        if isnan(number) or (number > 1.0 and not is_percent):  # whoever writes 10 means 10 %
-            raise InputError(f"{option} needs a share such as 10% or 0.1, not '{text}'.")
-        return number
-
-    return parse
+def aimed_share(text: str) -> float:
+    """Return the share that --aim asks for in a text like 10% or 0.1."""
+    number, is_percent = _number_or_percent(text)
+    if isnan(number) or (number > 1.0 and not is_percent):  # whoever writes 10 means 10 %
+        raise InputError(f"--aim needs a share such as 10% or 0.1, not '{text}'.")
+    return number
 
 
 def _number_or_percent(text: str) -> tuple[float, bool]:

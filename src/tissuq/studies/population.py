@@ -25,8 +25,6 @@ from tissuq.studies.fit_settings import PopulationSettings
 if TYPE_CHECKING:
     from tissuq.posterior.solver import Method
 
-__all__ = ["PopulationSettings", "PopulationStudy", "run_population"]
-
 MAX_DATA_WARNINGS = 8
 """Number of different warnings about the data that are shown."""
 

@@ -28,8 +28,6 @@ from tissuq.studies.run_settings import POINTS, PredictionSettings
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["predict_run", "predicted", "run_prediction"]
-
 
 def predict_run(
     run: str | Path, discrepancy: str | None = None, material: str | Material | None = None, **options: Any

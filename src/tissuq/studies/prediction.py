@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Prediction", "calibrated_points", "draw_prediction", "range_of"]
-
 
 ROWS_SHOWN = 9
 """Rows of a notebook's table."""

@@ -16,16 +16,6 @@ if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.next_test.candidates import Candidate
 
-__all__ = [
-    "POINTS",
-    "CandidateSettings",
-    "ComparedFile",
-    "DesignSettings",
-    "PredictionSettings",
-    "RunSettings",
-    "stretches",
-]
-
 POINTS = 101
 """Number of stretches of a band by default."""
 

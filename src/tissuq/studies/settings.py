@@ -19,11 +19,6 @@ from tissuq.errors import InputError, TissuqError
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = [
-    "DAMAGE", "DATA", "INPUT", "RECIPE", "SizesOfErrors", "damage_reported", "imported", "is_inside", "load_settings",
-    "looked_up", "positive_or_unknown", "seen_from", "setting_of", "there_is",
-]  # fmt: skip
-
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
 DATA = "data.csv"
@@ -158,17 +153,20 @@ def _place(item: Any) -> str:
     return ".".join(str(key) for key in item["loc"])
 
 
-def positive_or_unknown(value: Any, unit: str, reason: str = "") -> Any:
-    """Return a standard deviation, or 'unknown'; a ValueError, which pydantic reports with the setting, of any else.
+def positive_or_unknown(unit: str, reason: str = "") -> Callable[[Any], Any]:
+    """Return a validator of a standard deviation, or of several by name: each a positive number, or 'unknown'.
 
-    Or these by name. ``unit`` says in which they are, and ``reason`` why nothing else is possible.
+    ``unit`` says in which they are, and ``reason`` why nothing else is possible.
     """
-    if isinstance(value, dict):
-        return {name: positive_or_unknown(sd, unit, reason) for name, sd in value.items()}
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if value != "unknown" and not (is_number and 0 < value < inf):
-        raise ValueError(f"must be a positive number in {unit}, or 'unknown', not {value!r}{reason}")
-    return value
+
+    def check(value: Any) -> Any:
+        for sd in value.values() if isinstance(value, dict) else (value,):
+            is_number = isinstance(sd, int | float) and not isinstance(sd, bool)
+            if sd != "unknown" and not (is_number and 0 < sd < inf):
+                raise ValueError(f"must be a positive number in {unit}, or 'unknown', not {sd!r}{reason}")
+        return value
+
+    return check
 
 
 def looked_up(find: Callable[[Any], Named], name: Any) -> Named:

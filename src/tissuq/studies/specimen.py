@@ -39,11 +39,6 @@ from tissuq.studies.fit_settings import ALL, SpecimenSettings
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "SpecimenSettings", "SpecimenStudy", "fitted", "held_out_tests", "prediction_of", "priors_in_mpa", "run_specimen",
-    "shared_options", "steps_of", "warnings_of_files",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class SpecimenStudy:

@@ -25,24 +25,10 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
-from typing import Any, Generic, ParamSpec, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, ParamSpec, Protocol, TypeVar
 
 from tissuq.errors import InputError
 from tissuq.studies.batch_jobs import is_queue, workers_in_queue
-
-__all__ = [
-    "RESULTS",
-    "Campaign",
-    "Step",
-    "WorkerProcesses",
-    "forget_results",
-    "open_pool",
-    "read_results",
-    "run_tasks",
-    "silent",
-    "unfinished",
-    "write_whole",
-]
 
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
@@ -208,6 +194,18 @@ class Task(Protocol):
     @property
     def label(self) -> str:
         """Shown when the task is done."""
+
+
+@dataclass(frozen=True)
+class TaskOfFields:
+    """A task that is told from others by what it is made of; its label may be among that."""
+
+    separator: ClassVar[str] = "-"
+
+    @property
+    def key(self) -> str:
+        """What tells it from every other task of the campaign."""
+        return self.separator.join(str(value) for name, value in vars(self).items() if name != "label")
 
 
 Kind = TypeVar("Kind", bound=Task)

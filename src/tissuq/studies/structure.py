@@ -21,8 +21,6 @@ from tissuq.studies.earlier_run import load, load_without_discrepancy
 from tissuq.studies.finite_element_settings import SimulationSettings
 from tissuq.studies.stream import Step, run_tasks, silent
 
-__all__ = ["Posteriors", "SimulationSettings", "SimulationStudy", "load_posteriors", "run_simulation"]
-
 
 @dataclass(frozen=True)
 class Posteriors:

@@ -23,26 +23,12 @@ from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
 from tissuq.studies.campaign_settings import SbcOptions, each_once
-from tissuq.studies.stream import Campaign
+from tissuq.studies.stream import Campaign, TaskOfFields
 from tissuq.validation.coverage.fitted import fit_all, model_of, parameters_of
 from tissuq.validation.coverage.settings import BLOCK, Design
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = [
-    "SIZE",
-    "SbcSettings",
-    "Task",
-    "carry_out",
-    "ecdf_band",
-    "probabilities_of",
-    "run_sbc",
-    "shape_p_value",
-    "spread_p_value",
-    "summarise_ranks",
-    "tasks_of",
-]
 
 PRIORS: dict[str, Prior] = {
     "C10": Uniform(0.5, 1.5),
@@ -117,7 +103,7 @@ class SbcSettings(SbcOptions):
 
 
 @dataclass(frozen=True)
-class Task:
+class Task(TaskOfFields):
     """Some data sets of one formulation and noise, by their indices in the settings."""
 
     formulation: int
@@ -125,11 +111,6 @@ class Task:
     start: int
     count: int
     label: str
-
-    @property
-    def key(self) -> str:
-        """What tells it from every other task."""
-        return f"{self.formulation}-{self.noise}-{self.start}-{self.count}"
 
 
 def tasks_of(settings: SbcSettings) -> list[Task]:

@@ -26,25 +26,10 @@ from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.campaign_settings import StructureStudyOptions, each_once, names_among
 from tissuq.studies.settings import there_is
-from tissuq.studies.stream import Campaign
+from tissuq.studies.stream import Campaign, TaskOfFields
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = [
-    "DEFAULT",
-    "KNOWN_LAWS",
-    "ORACLE",
-    "STRUCTURES",
-    "KnownLaw",
-    "StructureStudySettings",
-    "StructureTask",
-    "carry_out",
-    "run_structures",
-    "simulated_tests",
-    "summarise_structures",
-    "tasks_of",
-]
 
 
 class KnownLaw(NamedTuple):
@@ -116,16 +101,12 @@ SMOOTH_LENGTH = 1 / 3
 
 
 @dataclass(frozen=True)
-class StructureTask:
+class StructureTask(TaskOfFields):
     """A set of tests of one truth."""
 
+    separator = "/"
     truth: str
     replicate: int
-
-    @property
-    def key(self) -> str:
-        """What tells it from every other task of the campaign."""
-        return f"{self.truth}/{self.replicate}"
 
     @property
     def label(self) -> str:

@@ -14,8 +14,6 @@ from tissuq.experiments.modes.mode import AlongAxis2, Control, LoadingMode
 from tissuq.experiments.modes.one_control import Planar
 from tissuq.experiments.modes.path import Deformation, Path
 
-__all__ = ["Biaxial", "ConstrainedUniaxial", "ImposedStretches", "InflatedTube", "ThinTube"]
-
 
 def _sheet(stretch_1: Any, stretch_2: Any) -> Deformation:
     return Deformation.along_axes((stretch_1, stretch_2, 1 / (stretch_1 * stretch_2)))

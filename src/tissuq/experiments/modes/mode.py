@@ -15,11 +15,6 @@ from tissuq.errors import ModelError
 from tissuq.experiments.modes.path import Deformation, Path, States
 from tissuq.registry import find, variants
 
-__all__ = [
-    "SHEAR", "STRETCH", "AlongAxis2", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes",
-    "values_of_control",
-]  # fmt: skip
-
 WORDS_FOR_MODES = {
     "tension": "uniaxial",
     "tensile": "uniaxial",

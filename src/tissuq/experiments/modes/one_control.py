@@ -11,8 +11,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes.mode import SHEAR, ControlPath, LoadingMode
 from tissuq.experiments.modes.path import TINY, Deformation, Path
 
-__all__ = ["Equibiaxial", "Planar", "SimpleShear", "SimpleShearNormal", "Uniaxial"]
-
 
 class Uniaxial(LoadingMode):
     """Tension or compression along one axis: F = diag(l, l^-1/2, l^-1/2).

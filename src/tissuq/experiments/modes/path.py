@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 
 from tissuq.arrays import FloatArray, IndexArray
 
-__all__ = ["STEP", "TINY", "UNMEASURED", "Deformation", "Path", "States"]
-
-
 STEP = 1e-30
 """Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
 TINY = 1e-300

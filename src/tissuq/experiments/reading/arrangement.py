@@ -24,16 +24,6 @@ from tissuq.experiments.reading.layout import FEWEST_ROWS, MISSING, WHITESPACE, 
 from tissuq.experiments.reading.table import Lines, Table, filled_on, padded
 from tissuq.experiments.units import looks_like_unit, measured_in
 
-__all__ = [
-    "blocks_of",
-    "joined_where_they_go_on",
-    "names_above",
-    "names_said_otherwise",
-    "title_of",
-    "transposed_table",
-    "with_names_above",
-]
-
 SAME, FAR = 0.1, 0.5
 """Share of the range of a column within which all blocks begin, and by which one of them goes back at a blank line."""
 MOST_STEPS = 2
@@ -269,8 +259,7 @@ def _joined(quantity: str, label: str) -> str:
     name, of_label = heading(quantity), heading(label)
     is_statistic = is_of_mean(of_label.quantity) or of_spread(of_label.quantity)[0]
     words = f"{name.quantity} {of_label.quantity}" if is_statistic else name.quantity
-    unit = of_label.unit or name.unit
-    return f"{words} ({unit})" if unit else words
+    return (of_label if of_label.unit else name).with_unit(words)
 
 
 def names_above(table: Table, columns: Sequence[int], *, are_distinct: bool = True) -> list[str]:

@@ -17,8 +17,6 @@ from tissuq.experiments.reading.stated_mode import is_torque
 from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED
 from tissuq.experiments.reading.table import Table
 
-__all__ = ["assumptions", "is_doubtful"]
-
 DOUBTFUL_UNIT, DOUBTFUL_COLUMN = "check the unit:", "check the column:"
 """How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000, a wrong column anything."""
 

@@ -26,14 +26,6 @@ from tissuq.experiments.reading.tube import SAME_STRETCH, Tube, rows_at_each_str
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import LENGTH, strain_factor
 
-__all__ = [
-    "AxialStretch",
-    "axial_stretch_of",
-    "note_of_stretched_tube",
-    "note_of_tube",
-    "stretches_held",
-]
-
 ROWS_AT_EACH = 3
 """Rows at each axial stretch, on average at least, where it is held."""
 NOTABLE_STRETCH = 0.1

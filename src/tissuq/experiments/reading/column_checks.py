@@ -27,17 +27,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
-__all__ = [
-    "SPREAD_ROLES",
-    "check_is_shear",
-    "check_machine",
-    "check_roles",
-    "check_section",
-    "check_test",
-    "check_together",
-    "with_types",
-]
-
 SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
 NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak|end of")

@@ -13,8 +13,6 @@ from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, Quantity
 
-__all__ = ["MPA_ASSUMED", "UnitOption", "declared_unit", "factor_of", "strain_factor_of", "stress_unit_of"]
-
 UnitOption = Literal["force_unit", "displacement_unit", "strain_unit"]
 """Options of reading that state the unit of a column."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, ThinTube
@@ -19,7 +20,7 @@ from tissuq.experiments.reading.column_checks import (
     with_types,
 )
 from tissuq.experiments.reading.columns_of_tube import columns_of_tube, with_columns_of_tube
-from tissuq.experiments.reading.headings import contents_of, on_axes_by_unit, on_axis
+from tissuq.experiments.reading.headings import on_axes_by_unit, on_axis
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -28,6 +29,7 @@ from tissuq.experiments.reading.recognition import (
     LOADS,
     ColumnChoice,
     Contents,
+    adding,
     columns_there_are,
     find_column,
     recognise,
@@ -36,8 +38,6 @@ from tissuq.experiments.reading.recognition import (
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT, ROLE_OF_AXIAL_STRETCH, ROLES
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
-
-__all__ = ["about_stress", "choose_columns", "mapping_of_each_stress"]
 
 
 def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> dict[str, ColumnChoice]:
@@ -59,9 +59,10 @@ def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> 
     mapping = {role: name for role, name in (options.get("columns") or {}).items() if role != ROLE_OF_AXIAL_STRETCH}
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
-    is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
+    names = list(map(on_axis, Contents.of(table, options).quantities))
+    is_of_axes = bool(mode.machine_axes) and _axes_of(names) == list(mode.machine_axes)
     if mode.machine_axes and not (is_of_axes or mapping):
-        mapping = _with_numbered_second(table)
+        mapping = _with_numbered_second(names)
     mappings = mapping_of_each_stress(mode, mapping)
     needed = (LOADS,) if len(mode.controls) == 1 else (LOADS, DEFORMATIONS)
     if not is_of_axes and not all(roles.keys() & kind for roles in mappings[1:] for kind in needed):
@@ -79,25 +80,16 @@ def choose_columns(table: Table, mode: LoadingMode, options: ReadingOptions) -> 
     return dict(zip(labels, choices, strict=True))
 
 
-@contextmanager
-def about_stress(number: int, labels: Sequence[str], mode: LoadingMode) -> Iterator[None]:
+def about_stress(number: int, labels: Sequence[str], mode: LoadingMode) -> AbstractContextManager[None]:
     """Add to what is wrong with a stress after the first how its columns and dimensions are given."""
-    try:
-        yield
-    except InputError as error:
-        if not number:
-            raise
-        sizes = " Along it the specimen measures --width, and across it --length." if mode.machine_axes else ""
-        raise InputError(
-            f"{error} (This is about {labels[number]}: roles of its columns end in 2, as in "
-            f"--column stress2=NAME.{sizes})"
-        ) from error
+    sizes = " Along it the specimen measures --width, and across it --length." if mode.machine_axes else ""
+    roles = "roles of its columns end in 2, as in --column stress2=NAME."
+    return adding(f"This is about {labels[number]}: {roles}{sizes}" if number else "")
 
 
-def _with_numbered_second(table: Table) -> dict[str, str | int]:
+def _with_numbered_second(names: Sequence[tuple[str, str]]) -> dict[str, str | int]:
     """Return the roles of columns whose first axis has no number, ``stretch`` beside ``stretch_2``; else none."""
     columns: dict[str, str | int] = {}
-    names = [on_axis(name) for name, _ in _names(table)]
     for column, (axis, name) in enumerate(names, start=1):
         role = next((role for role in (*DEFORMATIONS, *LOADS) if name in ROLES[role]), "")
         numbered = role + "2" * (axis == "y")
@@ -111,14 +103,9 @@ def _with_numbered_second(table: Table) -> dict[str, str | int]:
     return columns if is_whole else {}
 
 
-def _axes_of(table: Table) -> list[str]:
-    """Return the axes (x, y) of which the table has columns."""
-    return sorted({axis for axis, _ in (on_axis(name) for name, _ in _names(table)) if axis})
-
-
-def _names(table: Table) -> list[tuple[str, str]]:
-    """Return what the columns' names say they hold, and the measure of strain or stress."""
-    return contents_of(table.names, [table.unit(column) for column in range(len(table.names))])
+def _axes_of(names: Sequence[tuple[str, str]]) -> list[str]:
+    """Return the axes (x, y) of which there are columns, with the names of these."""
+    return sorted({axis for axis, _ in names} - {""})
 
 
 def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
@@ -137,8 +124,8 @@ def _choice(
     """Return the columns of one stress, in roles that are given or by their names."""
     is_shear, unnamed = mode.controls == (SHEAR,), set[int]()
     check_roles(table, mapping, is_shear)
-    quantities, measures = _quantities(table, axis, mapping), [measure for _, measure in _names(table)]
-    contents = Contents(quantities, measures, options.get("strain_type"), options.get("stress_type"))
+    contents = Contents.of(table, options)
+    contents = replace(contents, quantities=_quantities(table, contents.quantities, axis, mapping))
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
@@ -198,9 +185,12 @@ def _choice(
     return with_types(table, ColumnChoice(deformation, stress, measure, load, by_unit=frozenset(unnamed)), contents)
 
 
-def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
+def _quantities(
+    table: Table, quantities: Sequence[str], axis: str | None, mapping: Mapping[str, str | int]
+) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
-    names, axes = [on_axis(name) for name, _ in _names(table)], _axes_of(table)
+    names = list(map(on_axis, quantities))
+    axes = _axes_of(names)
     if len(axes) == 2:
         names = on_axes_by_unit(names, [*map(table.unit, range(len(names)))])
     if not mapping:

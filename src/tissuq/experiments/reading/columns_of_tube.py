@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from tissuq.errors import InputError
 from tissuq.experiments.modes import InflatedTube, LoadingMode, Planar, ThinTube
 from tissuq.experiments.reading.column_checks import with_types
-from tissuq.experiments.reading.headings import STRESS_NOUNS, contents_of
+from tissuq.experiments.reading.headings import STRESS_NOUNS
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import (
     DIAMETERS,
@@ -27,17 +27,6 @@ from tissuq.experiments.reading.vocabulary import (
     other_quantity,
 )
 from tissuq.experiments.units import FORCE, measured_in
-
-__all__ = [
-    "HOW_TO_READ_TUBE",
-    "HOW_TO_SAY_AXIAL_STRETCH",
-    "column_of_axial_stretch",
-    "columns_of_tube",
-    "is_axial_displacement",
-    "is_of_length",
-    "mode_of_tube",
-    "with_columns_of_tube",
-]
 
 FORCES = ("force", TOTAL_FORCE)
 """Roles of an axial force: without what the pressure on the closed ends pulls with, and with it."""
@@ -63,7 +52,7 @@ def mode_of_tube(table: Table, options: ReadingOptions) -> tuple[str, str]:
     Empty texts of other tables, and of one of pressure and diameter alone, which may have been stretched first.
     """
     columns = options.get("columns") or {}
-    quantities = _contents(table, options).quantities
+    quantities = Contents.of(table, options).quantities
     has_stress = any(quantity in ROLES["stress"] | STRESS_NOUNS for quantity in quantities)
     if not {PRESSURE, *DIAMETERS, *FORCES, *ROLES_BESIDE}.issuperset(columns) or has_stress:
         return "", ""
@@ -94,7 +83,7 @@ def columns_of_tube(table: Table, mode: LoadingMode, options: ReadingOptions) ->
     InputError
         When a column is missing, or several may be it.
     """
-    columns, contents = options.get("columns") or {}, _contents(table, options)
+    columns, contents = options.get("columns") or {}, Contents.of(table, options)
     if not {PRESSURE, *DIAMETERS, *FORCES, *ROLES_BESIDE}.issuperset(columns):
         return {}
     given = {role: name for role, name in columns.items() if role in (PRESSURE, *DIAMETERS)}
@@ -170,12 +159,6 @@ def is_of_length(table: Table, column: int) -> bool:
 def is_axial_displacement(table: Table, column: int) -> bool:
     """Tell whether a column of lengths holds what a tube is longer by, by its name."""
     return table.quantities[column] in ROLES["displacement"]
-
-
-def _contents(table: Table, options: ReadingOptions) -> Contents:
-    names = contents_of(table.names, [table.unit(column) for column in range(len(table.names))])
-    quantities, measures = [name for name, _ in names], [measure for _, measure in names]
-    return Contents(quantities, measures, options.get("strain_type"), options.get("stress_type"))
 
 
 def _force(table: Table, columns: Mapping[str, str | int], quantities: Sequence[str]) -> tuple[str, int, bool]:

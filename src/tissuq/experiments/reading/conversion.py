@@ -28,8 +28,6 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import FORCE
 
-__all__ = ["as_columns", "measured_rows", "points_of", "stress_measure_of", "with_engineering_stress"]
-
 LONG = "engineering stress of "
 """How names of several stresses begin; what is said of each of them begins with the axis alone."""
 

@@ -15,8 +15,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, FileFormat, as_text, explained, line_of
 
-__all__ = ["DataColumn", "ParquetFile", "columns_of", "is_data_frame", "kind_of", "lines_of"]
-
 PANDAS, XARRAY, POLARS, LAZY, OTHERS = "iloc", "to_dataframe", "get_columns", "collect", "to_pandas"
 """What a table of each library can do, and no path can."""
 NUMBERS = "iuf"

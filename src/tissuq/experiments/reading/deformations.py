@@ -27,8 +27,6 @@ from tissuq.experiments.reading.recognition import DIAMETERS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import ANGLE, FORCE, LENGTH, PIXELS, RATE, TIME, Quantity, measured_in
 
-__all__ = ["stretch_of", "without_machine"]
-
 NOTABLE_TWIST = 0.05
 """Share of its range by which a twist may begin away from 0."""
 

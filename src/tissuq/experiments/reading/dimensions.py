@@ -12,8 +12,6 @@ from tissuq.experiments.reading.stated_sizes import StatedSize
 from tissuq.experiments.reading.tube import Tube
 from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
-__all__ = ["SECTIONS", "Dimension", "Dimensions", "agree", "in_words", "quantity_of", "sections_of"]
-
 SHOWN = 3
 """Number of other sizes that a message shows."""
 CONTRADICTION = 0.01

@@ -21,8 +21,6 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
 from tissuq.experiments.units import FORCE, LENGTH, PIXELS
 
-__all__ = ["dimensions_of", "dimensions_of_stresses", "given_size", "initial_size", "of_block"]
-
 NOTABLE_SCATTER = 0.2
 """Range of measurements of one size over their mean, from which they are hardly those of one specimen."""
 MEAN_OF = "mean of"

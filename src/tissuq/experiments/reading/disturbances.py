@@ -10,22 +10,6 @@ import numpy as np
 from tissuq.arrays import IndexArray
 from tissuq.experiments.reading.table import Column
 
-__all__ = [
-    "UNIFORM_SD",
-    "Event",
-    "averaged",
-    "ends_of_rests",
-    "find_drift",
-    "find_holds",
-    "find_outliers",
-    "find_rupture",
-    "find_saturation",
-    "find_slips",
-    "scatter_of_neighbours",
-    "staircase_of",
-    "step_of",
-]
-
 RUPTURE_FALL, SUDDEN_FALL = 0.2, 0.5
 """Shares of the largest stress by which it falls at a rupture: while the test goes on, and within a few rows."""
 SUDDEN_ROWS, LASTING_ROWS = 3, 2

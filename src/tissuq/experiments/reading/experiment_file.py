@@ -64,8 +64,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 
-__all__ = ["Reading", "read", "read_experiment", "read_file", "read_rows", "table_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Reading:

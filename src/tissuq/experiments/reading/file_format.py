@@ -13,8 +13,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.layout import find_layout
 from tissuq.registry import plugins, variants
 
-__all__ = ["SEPARATOR_OF_CELLS", "FileFormat", "as_text", "explained", "file_format", "line_of", "sheets_with_tables"]
-
 LONGEST_SIGNATURE = 64
 """First bytes of a file that are looked at."""
 SEPARATOR_OF_CELLS = "\t"

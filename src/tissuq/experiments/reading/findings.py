@@ -27,8 +27,6 @@ from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["data_warnings"]
-
 MIN_ROWS_PER_CYCLE = 10
 """Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
 NOTABLE_SHARE = 0.05

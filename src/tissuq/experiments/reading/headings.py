@@ -23,28 +23,6 @@ from tissuq.experiments.reading.vocabulary import (
 )
 from tissuq.experiments.units import BRACKETS, looks_like_unit, measured_in
 
-__all__ = [
-    "AXES",
-    "COMPONENTS",
-    "STRESS_NOUNS",
-    "Heading",
-    "contents_of",
-    "dimensions_named",
-    "heading",
-    "is_of_mean",
-    "is_of_role",
-    "is_of_specimens",
-    "measure_in",
-    "of_spread",
-    "on_axes_by_unit",
-    "on_axis",
-    "on_lettered_axis",
-    "plain",
-    "without_correction",
-    "without_mean",
-]
-
-
 MEASURES: dict[str, list[StrainMeasure] | list[StressMeasure]] = {
     "strain": [measure for measure in STRAIN_MEASURES.values() if measure.stretch],
     "shear": [measure for measure in STRAIN_MEASURES.values() if measure.shear],
@@ -134,6 +112,10 @@ class Heading:
 
     quantity: str
     unit: str = ""
+
+    def with_unit(self, name: str) -> str:
+        """Return another name with the unit, if there is one."""
+        return f"{name} ({self.unit})" if self.unit else name
 
 
 @lru_cache(maxsize=REMEMBERED)

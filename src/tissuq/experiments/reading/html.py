@@ -8,8 +8,6 @@ from html.parser import HTMLParser
 from tissuq.experiments.reading.file_format import FileFormat, line_of
 from tissuq.experiments.reading.text_file import read_lines
 
-__all__ = ["Html"]
-
 BEGINNINGS = (b"<html", b"<!doctype html", b"<table", b"<meta", b"<head", b"<body", b"<!--")
 BYTE_ORDER_MARKS = b"\xef\xbb\xbf\xff\xfe"
 """Their bytes."""

@@ -22,8 +22,6 @@ from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, SPREADS
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import merged
 
-__all__ = ["Inspection", "inspect", "lines_of_tests", "noise_between_neighbours", "overview"]
-
 MIN_TRIPLES = 30
 """Number of triples of neighbouring measurements from which their scatter shows the noise."""
 MAX_CYCLES_SHOWN = 12

@@ -11,8 +11,6 @@ from typing import Any
 from tissuq.errors import InputError
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
 
-__all__ = ["JsonFile"]
-
 
 class JsonFile(FileFormat):
     """Tables as lists of rows or of columns, each a sheet under its name in the file."""

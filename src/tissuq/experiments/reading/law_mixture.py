@@ -11,9 +11,6 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.modes.path import STEP
 
-__all__ = ["EVERY_LAW", "LawMixture", "not_negative"]
-
-
 ANGLES, COUPLINGS = np.linspace(0, np.pi / 2, 19), (0.0, 0.5, 1.0)
 RATES_OF_FIBRES, RATES_OF_MATRIX = np.geomspace(0.1, 60, 16), np.geomspace(0.1, 20, 10)
 EXPONENTS = (3, 4, 5, 7, 9, 11, 14, 18)

@@ -11,23 +11,6 @@ from functools import partial
 from tissuq.experiments.numbers import GROUPED, MEAN_WITH_SPREAD, NUMBER
 from tissuq.experiments.units import looks_like_unit
 
-__all__ = [
-    "LENGTH_RATIO",
-    "MISSING",
-    "SHORT_TABLE",
-    "SPREADSHEET_ERRORS",
-    "WHITESPACE",
-    "Layout",
-    "column_names",
-    "find_layout",
-    "is_comment",
-    "is_units_row",
-    "joined",
-    "later_tables",
-    "likely_separator",
-    "split",
-]
-
 WHITESPACE = " "
 SEPARATORS = ("\t", ";", ",", "|", WHITESPACE)
 SPREADSHEET_ERRORS = frozenset(

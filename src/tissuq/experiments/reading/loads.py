@@ -21,8 +21,6 @@ from tissuq.experiments.reading.twisted_disc import apparent_stress
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
 
-__all__ = ["Load", "force_in", "stress_of", "without_zero"]
-
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
 

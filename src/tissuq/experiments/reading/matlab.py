@@ -13,8 +13,6 @@ import numpy as np
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
 from tissuq.experiments.reading.headings import heading, is_of_role
 
-__all__ = ["MatlabFile"]
-
 FEWEST_ROWS = 2
 """Length of a vector that may be a column."""
 AXES = 2
@@ -149,14 +147,8 @@ def _of_tests(matrices: Mapping[str, Any], vectors: Mapping[str, Any]) -> _Table
     for number in range(1, count + 1):
         for key, value in upright.items():
             tests_above.append(f"test {number}")
-            names.append(key if count > AXES else _numbered(key, number))
+            names.append(key if count > AXES else heading(key).with_unit(f"{heading(key).quantity} {number}"))
             columns.append(value[:, number - 1])
     lines = [line_of(tests_above)] if count > AXES else []
     content = [*lines, line_of(names), *map(line_of, np.column_stack(columns).tolist())]
     return _TableOfTests(frozenset([*named, *common]), content)
-
-
-def _numbered(key: str, number: int) -> str:
-    """Return the name of one of the columns of a matrix, such as ``stress 1 (kPa)``."""
-    name = heading(key)
-    return f"{name.quantity} {number} ({name.unit})" if name.unit else f"{name.quantity} {number}"

@@ -20,8 +20,6 @@ from tissuq.experiments.reading.tube import SAME_STRETCH, rows_at_each_stretch
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import StressUnit
 
-__all__ = ["COUNTED_FROM", "Cycle", "Dropped", "MeasuredRows", "find_cycles", "labelled"]
-
 COUNTED_FROM = "stretch counted from"
 """How the step begins that says where the specimen is undeformed."""
 STRETCH_MARGIN = 1e-5

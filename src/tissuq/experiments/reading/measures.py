@@ -15,9 +15,6 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.tube import Tube
 from tissuq.experiments.reading.twisted_disc import rim_stress
 
-__all__ = ["STRAIN_MEASURES", "STRESS_MEASURES", "StrainMeasure", "StressMeasure", "measure_of_tube"]
-
-
 ENGINEERING = (
     r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|инженерн\w+|"
     r"номинальн\w+|условн\w+"
@@ -177,10 +174,6 @@ class StressMeasure:
     doubt: Callable[[FloatArray, FloatArray], str] = lambda points, stress: ""
 
 
-def _from_cauchy(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> FloatArray:
-    return np.asarray(stress / np.stack([path.cauchy_ratio(points) for path in mode.paths]))
-
-
 def _from_torsion(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> FloatArray:
     if mode.controls != (SHEAR,) or len(mode.stresses) > 1:
         raise InputError(
@@ -199,7 +192,7 @@ STRESS_MEASURES = {
         StressMeasure(
             name="cauchy",
             words=rf"cauchy|kirchhoff|{TRUE}|коши",
-            engineering=_from_cauchy,
+            engineering=lambda mode, points, stress: stress / np.stack([p.cauchy_ratio(points) for p in mode.paths]),
             step="Cauchy stress divided by stretch to engineering stress",
         ),
         StressMeasure(

@@ -14,8 +14,6 @@ from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
 
-__all__ = ["READING_OPTIONS", "TURNS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
-
 TURNS = {"load": ("load",), "deformation": ("deformation",), "both": ("deformation", "load")}
 """What signs may be changed of, by what asks for it."""
 NAMES_OF_OPTIONS: Mapping[str, Collection[str]] = {

@@ -19,8 +19,6 @@ from tissuq.experiments.reading.layout import MISSING, WHITESPACE, joined, split
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import SPREADS
 
-__all__ = ["with_plain_numbers", "without_statements_beside", "without_summary"]
-
 LARGEST_SHARE = 0.5
 """Share of the rows of a table beside which statements stand; a column of measurements goes on to its end."""
 ROWS_OF_STATEMENT = 2
@@ -311,5 +309,4 @@ def _names(name: str) -> tuple[str, str]:
     kind, _ = of_spread(plain(words["kind"] or "")) if words else ("", "")
     of_mean = SPREAD_IN_NAME.sub(" ", name).strip()
     name_of_mean = heading(of_mean)
-    of_spreads = f"{name_of_mean.quantity} {kind if kind in SPREADS else '±'}"
-    return of_mean, f"{of_spreads} ({name_of_mean.unit})" if name_of_mean.unit else of_spreads
+    return of_mean, name_of_mean.with_unit(f"{name_of_mean.quantity} {kind if kind in SPREADS else '±'}")

@@ -13,22 +13,6 @@ from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import ANGLE, strain_factor
 
-__all__ = [
-    "DOUBTFUL_STRAIN",
-    "FIRST_ROW",
-    "LITTLE_LOAD",
-    "RATIO_ASSUMED",
-    "ZERO_ASSUMED",
-    "check_lengths",
-    "check_positions",
-    "check_shear",
-    "check_strain",
-    "check_stretches",
-    "poisson_ratio",
-    "readable_shares",
-    "volume_step",
-]
-
 PLAIN_STRAIN_LIMIT = 10.0
 """A strain without a unit beyond this (1000 %) is taken for percent and asked about."""
 DOUBTFUL_STRAIN = 1.0

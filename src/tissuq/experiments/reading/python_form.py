@@ -12,8 +12,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.options import PARTS
 
-__all__ = ["in_python", "refusals_worded_for", "wording_for"]
-
 SWITCHES = {
     "compression-positive": "compression_positive=True",
     "tension-positive": "compression_positive=False",

@@ -3,36 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import Self
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, plain
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, contents_of, dimensions_named, plain
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES, ROLES_OF_TUBE, other_quantity
 from tissuq.experiments.units import measured_in
-
-__all__ = [
-    "DEFORMATIONS",
-    "DEFORMATIONS_OF_UNITS",
-    "DIAMETERS",
-    "LENGTHENINGS",
-    "LOADS",
-    "OTHER_MEASURE",
-    "PRESSURE",
-    "SHEARS",
-    "TOTAL_FORCE",
-    "ColumnChoice",
-    "Contents",
-    "ambiguous",
-    "columns_there_are",
-    "find_column",
-    "recognise",
-    "say_which",
-    "told_by_unit",
-]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
@@ -98,6 +81,13 @@ class Contents:
     measures: Sequence[str]
     strain_type: str | None = None
     stress_type: str | None = None
+
+    @classmethod
+    def of(cls, table: Table, options: ReadingOptions) -> Self:
+        """Return what the columns of a table hold, and which measures are asked for."""
+        names = contents_of(table.names, [table.unit(column) for column in range(len(table.names))])
+        quantities, measures = [name for name, _ in names], [measure for _, measure in names]
+        return cls(quantities, measures, options.get("strain_type"), options.get("stress_type"))
 
     def fitting(self, *roles: str) -> list[int]:
         """Return the columns that may have one of the roles: of several those of the measure that is wanted.
@@ -230,6 +220,17 @@ def _several_hint(table: Table, contents: Contents, roles: Sequence[str]) -> str
         f" If columns {columns[0] + 1} to {columns[-1] + 1} hold the stresses of several specimens, give "
         f"--column stress={columns[0] + 1}:{columns[-1] + 1} and --stress-unit."
     )
+
+
+@contextmanager
+def adding(text: str) -> Iterator[None]:
+    """Add a text, in brackets, to what is wrong; nothing where it is empty."""
+    try:
+        yield
+    except InputError as error:
+        if not text:
+            raise
+        raise InputError(f"{error} ({text})") from error
 
 
 def say_which(kind: str) -> str:

@@ -27,8 +27,6 @@ from tissuq.experiments.reading.slack import Slack, find_slack
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import StressUnit
 
-__all__ = ["AUTO", "Region", "TestedStress", "least_errors", "regions_of", "slack_error", "tested_stresses"]
-
 AUTO = "auto"
 """What is given for a preload where load begins."""
 UNTIL_PEAK = "to leave out what follows the largest stress give --until-peak."

@@ -19,20 +19,6 @@ from tissuq.experiments.reading.table import Column, Table, filled_on
 from tissuq.experiments.reading.tube import SAME_STRETCH
 from tissuq.experiments.reading.vocabulary import AXIAL_STRETCH, CYCLE_NAMES, SET_NAMES
 
-__all__ = [
-    "LABELS",
-    "SeveralSpecimens",
-    "advice_on_numbered_tests",
-    "check_one_specimen",
-    "columns_only",
-    "jump",
-    "labels_of",
-    "only_rows",
-    "other_label",
-    "row_names",
-    "specimen_of",
-]
-
 ROWS_OF_TEST = 5
 """Rows that the tests of a table have on average at least."""
 RESTART, RETURN = 0.1, 0.5

@@ -27,8 +27,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES, other_quantity
 from tissuq.experiments.units import measured_in
 
-__all__ = ["ColumnsOfTest", "TestBeside", "columns_named_again", "columns_side_by_side", "test_beside"]
-
 PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
 """Words and capacities that tell one load cell from another, and not tests."""
 BETWEEN_WORDS = re.compile(r"\s+|(?<=\w)\.(?=[^\W\d]{2})")

@@ -12,12 +12,10 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.options import TURNS, ReadingOptions
-from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice, adding
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import StressUnit
-
-__all__ = ["check_signs", "with_signs"]
 
 SIGNED = ("strain", "displacement", *SHEARS)
 """Deformations that may be counted the other way round."""
@@ -157,14 +155,9 @@ def check_signs(
 
     Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
     """
-    try:
+    turn = options.get("turn")
+    with adding(f"Signs are turned as asked, --turn {turn}: turn others, or leave it out." if turn else ""):
         _check_work(measured, choices, bool(options.get("compression_positive")), unit)
-    except InputError as error:
-        if (turn := options.get("turn")) is None:
-            raise
-        raise InputError(
-            f"{error} (Signs are turned as asked, --turn {turn}: turn others, or leave it out.)"
-        ) from error
 
 
 def _check_work(

@@ -10,8 +10,6 @@ import numpy as np
 from tissuq.experiments.reading.disturbances import averaged
 from tissuq.experiments.reading.table import Column
 
-__all__ = ["Slack", "find_slack"]
-
 STARTS = np.concatenate([[0.0], np.linspace(0.02, 0.7, 35)])
 """Shares of the way at which the load may begin."""
 FINER = np.linspace(-0.03, 0.03, 25)

@@ -22,17 +22,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 from tissuq.experiments.reading.text_file import read_lines
 
-__all__ = [
-    "SUFFIXES",
-    "CovariateTable",
-    "covariate_columns",
-    "find_tests",
-    "of_specimen",
-    "read_column",
-    "read_covariates",
-    "tables_in",
-]
-
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet", ".json")
 """Of files in a folder that may hold measurements."""
 BESIDE_TABLES = ("~$", "._", ".~")

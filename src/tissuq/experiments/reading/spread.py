@@ -16,8 +16,6 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import COUNT_NAMES, ROLE_OF_AXIAL_STRETCH, ROLES, SPREADS
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
-__all__ = ["Spread", "spread_of"]
-
 UPPER = 0.975
 """Upper end of an interval of 95 %."""
 

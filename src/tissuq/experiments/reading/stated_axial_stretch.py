@@ -14,8 +14,6 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube import SAME_STRETCH
 from tissuq.experiments.reading.vocabulary import AXIAL_STRAIN, AXIAL_STRETCH
 
-__all__ = ["LARGEST", "StatedAxialStretch", "stated_axial_stretch"]
-
 LEAST, LARGEST = 0.9, 4.0
 """Axial stretches beyond which a number is hardly one: a strain below them, percent above."""
 BETWEEN_LETTERS = re.compile(r"(?<=[^\W\d])[-_](?=[^\W\d])")

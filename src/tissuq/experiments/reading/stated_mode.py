@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -24,26 +24,9 @@ from tissuq.experiments.reading.headings import (
     on_lettered_axis,
 )
 from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, adding
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, ROLES
-
-__all__ = [
-    "DEFAULT_MODE",
-    "DEFAULT_SOURCE",
-    "GIVEN",
-    "about_mode",
-    "check_not_inflated",
-    "check_not_sheared",
-    "comment_on_mode",
-    "direction_of",
-    "find_mode",
-    "is_named_by_mode",
-    "is_torque",
-    "mode_in_comment",
-    "mode_of",
-    "modes_in_column",
-]
 
 DEFAULT_MODE = "uniaxial"
 """Where nothing states one."""
@@ -262,18 +245,11 @@ def check_not_inflated(table: Table, stress: int) -> None:
             )
 
 
-@contextmanager
-def about_mode(mode: str, source: str) -> Iterator[None]:
+def about_mode(mode: str, source: str) -> AbstractContextManager[None]:
     """Add to what is wrong with the columns where the file's loading mode comes from, unless it was given."""
-    try:
-        yield
-    except InputError as error:
-        if not mode or source in ("", GIVEN, DEFAULT_SOURCE):
-            raise
-        meant = MEANT.get(mode, "")
-        raise InputError(
-            f"{error} (The loading mode {mode} is from {source}; give --mode for another.{meant})"
-        ) from error
+    is_stated = mode and source not in ("", GIVEN, DEFAULT_SOURCE)
+    about = f"The loading mode {mode} is from {source}; give --mode for another.{MEANT.get(mode, '')}"
+    return adding(about if is_stated else "")
 
 
 def _mode_of_columns(table: Table, sizes: Collection[str]) -> tuple[str, str]:

@@ -17,8 +17,6 @@ from tissuq.experiments.reading.table import Table, padded
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import AREA, LENGTH, Quantity, looks_like_unit
 
-__all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "sizes_without_unit", "stated_sizes"]
-
 UNIT_ASSUMED = "as of displacements)"
 """What follows the unit of a size that a table of specimens states without one."""
 UNIT = r"(?:mm|cm|um|µm|мм|см|мкм|毫米|厘米)[2²]?"

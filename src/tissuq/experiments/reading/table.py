@@ -15,8 +15,6 @@ from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import MISSING, SPREADSHEET_ERRORS, WHITESPACE, joined, split
 from tissuq.experiments.units import BRACKETS
 
-__all__ = ["Column", "Lines", "Table", "filled_on", "padded", "rows_in"]
-
 Column = FloatArray
 Lines = list[tuple[int, str]]
 

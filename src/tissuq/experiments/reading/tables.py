@@ -39,9 +39,6 @@ from tissuq.experiments.reading.plain_tables import with_plain_numbers, without_
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
 
-__all__ = ["read_table", "read_tables"]
-
-
 LONG_FILE = 10_000
 """Lines from which a file is first tried on a fast parser."""
 HEAD_LINES = 1000

@@ -30,8 +30,6 @@ from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, d
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_tables
 
-__all__ = ["TestInFile", "find_tests_in_file", "measurements", "read_tests"]
-
 MIN_SHARE_OF_TEST = 0.5
 """Rows of a table that may be a test, over those of the longest test in its file; shorter ones are of results."""
 

@@ -11,8 +11,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.numbers import without_marks
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES
 
-__all__ = ["DATA_SETS", "read_lines"]
-
 DATA_SETS = Path(__file__).parents[1] / "data"
 """Folder of the measured curves that come with the package."""
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}

@@ -11,9 +11,6 @@ from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.law_mixture import EVERY_LAW, LawMixture, not_negative
 
-__all__ = ["SAME_STRETCH", "Tube", "rows_at_each_stretch"]
-
-
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 """Of Gauss quadrature through the wall, from the outer to the inner face."""
 MOST_ROWS = 400
@@ -137,7 +134,7 @@ class Tube:
         """
         laws, moduli, misfit = self._fitted(hoop, axial, loads)
         has_force = len(loads) > 1
-        if has_force and misfit > NOTABLE_MISFIT and self._fitted(hoop, axial, _turned(loads))[2] < misfit / 3:
+        if has_force and misfit > NOTABLE_MISFIT and self._fitted(hoop, axial, loads * [[1], [-1]])[2] < misfit / 3:
             raise InputError(OTHER_SIGN)
         if misfit > LARGEST_MISFIT:
             raise InputError(NO_WALL if has_force else NOT_WIDER)
@@ -184,11 +181,6 @@ class Tube:
         pressure = np.einsum("nqk,nq->nk", around, WEIGHTS / 2 / (through * held))
         force = np.einsum("nqk,q->nk", along, of_area)
         return np.stack([pressure, force - np.einsum("nqk,nq->nk", around, of_area * through / (2 * held))])
-
-
-def _turned(loads: FloatArray) -> FloatArray:
-    """Return a pressure and the force of the other sign."""
-    return loads * [[1], [-1]]
 
 
 def _moved(measured: FloatArray, mean: FloatArray, in_middle: FloatArray) -> FloatArray:

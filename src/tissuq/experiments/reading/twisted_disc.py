@@ -9,9 +9,6 @@ import numpy as np
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 
-__all__ = ["apparent_stress", "rim_stress"]
-
-
 MAX_DEGREE = 3
 """Degree of the polynomial."""
 POINTS_OF_TERM = 4

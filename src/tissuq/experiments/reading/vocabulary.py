@@ -7,31 +7,6 @@ from unicodedata import normalize
 
 from tissuq.experiments.units import measured_in
 
-__all__ = [
-    "AXIAL_STRAIN",
-    "AXIAL_STRETCH",
-    "COUNT_NAMES",
-    "CYCLE_NAMES",
-    "DEFORMATION_NOUNS",
-    "DIMENSION_NAMES",
-    "HEIGHT_NAMES",
-    "LENGTH_OF_TUBE",
-    "MEAN_WORDS",
-    "NOUNS",
-    "OF_SPECIMEN",
-    "OPEN_WITHOUT_UNIT",
-    "ROLES",
-    "ROLES_OF_TUBE",
-    "ROLE_OF_AXIAL_STRETCH",
-    "SET_NAMES",
-    "SPECIMEN_NAME",
-    "SPREADS",
-    "SPREAD_WORDS",
-    "names_of",
-    "other_quantity",
-    "without_accents",
-]
-
 ACCENTS = re.compile(r"(?<=[A-Za-z])[\u0300-\u036f]+")
 """Accents of Latin letters, where these are written apart from them."""
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "ё": "е", "ł": "l"})

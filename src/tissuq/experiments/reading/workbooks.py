@@ -9,8 +9,6 @@ from typing import Any, ClassVar
 
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
 
-__all__ = ["BinaryWorkbook", "OldWorkbook", "OpenDocument", "Workbook"]
-
 ZIP = b"PK\x03\x04"
 
 

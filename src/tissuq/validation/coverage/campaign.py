@@ -15,25 +15,13 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.stream import Campaign
+from tissuq.studies.stream import Campaign, TaskOfFields
 from tissuq.validation.coverage.fitted import fit_all
 from tissuq.validation.coverage.settings import BLOCK, CoverageSettings
 from tissuq.validation.coverage.truths import TRUTHS, Truth, draw_truth
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = [
-    "Task",
-    "carry_out",
-    "run_campaign",
-    "share_of_new",
-    "stress_unseen",
-    "summarise",
-    "summarise_unseen",
-    "tasks_of",
-    "unseen_stretches",
-]
 
 
 POINTS = 12
@@ -72,7 +60,7 @@ def unseen_stretches(measured: LoadingMode, stretch: FloatArray, mode: LoadingMo
 
 
 @dataclass(frozen=True)
-class Task:
+class Task(TaskOfFields):
     """Some replicates of one family on one design, with one formulation; all by their indices in the settings."""
 
     design: int
@@ -83,11 +71,6 @@ class Task:
     start: int
     count: int
     label: str
-
-    @property
-    def key(self) -> str:
-        """What tells it from every other task of the campaign."""
-        return "-".join(map(str, self.indices.values()))
 
     @property
     def indices(self) -> dict[str, int]:

@@ -22,8 +22,6 @@ from tissuq.posterior.fitting import fit_many
 from tissuq.posterior.posterior import Posterior
 from tissuq.validation.paper.study import FORMULATIONS
 
-__all__ = ["fit_all", "model_of", "parameters_of", "parts_of"]
-
 AVERAGES = {"average-of-seven": FORMULATIONS}
 """Averages of fits by their evidence: the paper's seven formulations."""
 NoiseSd = float | str

@@ -20,8 +20,6 @@ from tissuq.studies.settings import looked_up, there_is
 from tissuq.validation.coverage.fitted import model_of, parameters_of, parts_of
 from tissuq.validation.coverage.truths import FAMILIES, FIXED, MIN_LOCKING_LIMIT, TRUTHS
 
-__all__ = ["BLOCK", "PRESETS", "CoverageSettings", "Design", "preset"]
-
 PRESETS = (
     "paper",
     "panel",

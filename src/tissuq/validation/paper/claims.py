@@ -10,8 +10,6 @@ import numpy as np
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 
-__all__ = ["CLAIMS", "Claim", "Finding", "Findings", "Verdict", "find", "judge", "passes"]
-
 
 @dataclass(frozen=True)
 class Finding:

@@ -25,20 +25,6 @@ from tissuq.result_warning import ResultWarning, Severity, merged
 from tissuq.studies.campaign_settings import PaperOptions
 from tissuq.validation.paper.claims import Finding, Findings, Verdict, find, judge
 
-__all__ = [
-    "AMPLITUDE_BOUNDS",
-    "FORMULATIONS",
-    "RANGES",
-    "Cell",
-    "Fitted",
-    "PaperSettings",
-    "PaperStudy",
-    "ranges_of",
-    "run_paper",
-    "sensitivity",
-    "steps_of",
-]
-
 FORMULATIONS = ("none", "constant", "linear", "quadratic", "mooney-rivlin", "yeoh", "gp")
 """The paper's seven formulations of model uncertainty, in its order."""
 

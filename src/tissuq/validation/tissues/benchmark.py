@@ -23,28 +23,11 @@ from tissuq.prediction.bands import predictive_mixtures, speaks_of
 from tissuq.prediction.scores import interval_score, root_mean_square
 from tissuq.studies.campaign_settings import TissueOptions, each_once, names_among
 from tissuq.studies.settings import there_is
-from tissuq.studies.stream import Campaign
+from tissuq.studies.stream import Campaign, TaskOfFields
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = [
-    "ALL",
-    "END_SHARE",
-    "ESTIMAND_OF_PROTOCOL",
-    "PROBABILITIES",
-    "PROTOCOLS",
-    "RIVALS",
-    "PredictionTask",
-    "Split",
-    "TissueSettings",
-    "predicted",
-    "run_benchmark",
-    "summarise_tissues",
-    "summarise_verdicts",
-    "tasks_of",
-]
 
 
 PROBABILITIES = (0.5, 0.8, 0.95)
@@ -173,18 +156,14 @@ class TissueSettings(TissueOptions):
 
 
 @dataclass(frozen=True)
-class PredictionTask:
+class PredictionTask(TaskOfFields):
     """A prediction of one test by one formulation, all by their indices but the set, which has a name."""
 
     tissue: str
     protocol: str
     number: int
     formulation: str
-
-    @property
-    def key(self) -> str:
-        """What tells it from every other task of the benchmark."""
-        return f"{self.tissue}/{self.protocol}/{self.number}/{self.formulation}"
+    separator = "/"
 
     @property
     def label(self) -> str:

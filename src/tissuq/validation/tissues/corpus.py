@@ -18,8 +18,6 @@ from tissuq.experiments.modes import LoadingMode, Uniaxial, loading_mode
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["INDEX", "TissueSet", "read_corpus"]
-
 INDEX = "index.csv"
 """The file of a folder that tells what each set is of: columns ``dataset`` and ``class`` or ``tissue``."""
 COLUMNS = ("mode", "stretch", "stress_MPa")
