@@ -3,8 +3,6 @@
 import os
 import sys
 
-__all__ = ["main"]
-
 
 def main() -> None:
     """Run the command line; an interrupt while its modules are loaded is no traceback.

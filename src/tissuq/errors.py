@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["ConvergenceError", "InputError", "ModelError", "TissuqError"]
-
 
 class TissuqError(Exception):
     """The family: catch this to catch everything that tissuq raises on purpose."""

@@ -13,8 +13,6 @@ from typing import Any, TypeVar
 
 from tissuq.errors import ModelError, TissuqError
 
-__all__ = ["find", "load_plugins", "plugins", "variants"]
-
 T = TypeVar("T")
 
 

@@ -8,17 +8,6 @@ from enum import StrEnum
 from json import dumps
 from types import MappingProxyType
 
-__all__ = [
-    "WARNING_CODES",
-    "ResultWarning",
-    "Severity",
-    "has_code",
-    "in_shell",
-    "merged",
-    "most_severe_first",
-    "symbols_in",
-]
-
 
 class Severity(StrEnum):
     """How severe a warning is."""

@@ -22,8 +22,6 @@ from tissuq.mechanics.invariants import farthest_stretch
 from tissuq.prediction.bands import predict_band
 from tissuq.result_warning import ResultWarning, has_code
 
-__all__ = ["NOTABLE_SHARE", "Answer", "Estimate", "SheetStresses", "answer_of", "sheet_stresses"]
-
 NOTABLE_SHARE = 0.05
 """Of the stress, from which the discrepancy is worth a word."""
 MIN_SHEET_STRAIN = 0.01

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Average", "average", "compare", "scores_of", "values_in_mpa"]
-
 NEGLIGIBLE_WEIGHT = 1e-9
 """Weight below which a fit is omitted from marginals and predictions."""
 

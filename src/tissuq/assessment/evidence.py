@@ -8,8 +8,6 @@ import numpy as np
 
 from tissuq.result_warning import ResultWarning
 
-__all__ = ["warnings_of_evidence"]
-
 MIN_ERROR_OF_DIFFERENCE = 0.1
 """Error of the difference of two log evidences below which it changes no conclusion."""
 

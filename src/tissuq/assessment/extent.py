@@ -30,8 +30,6 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import FittedErrors
 from tissuq.prediction.moments import values_of
 
-__all__ = ["Assessment", "assess", "has_energy"]
-
 Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
 
 NEGLIGIBLE_INITIAL_SHARE = 1e-3

@@ -13,8 +13,6 @@ from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["factors_of_tests", "falls", "labels_of_tests", "measurement_warnings"]
-
 MIN_MEASUREMENTS = 12
 """Smallest number of measurements that describe how the stress deviates from the material."""
 NEAR_STRAIN_SHARE = 0.15

@@ -15,9 +15,6 @@ from tissuq.mechanics import Material, initial_shear_modulus, stress_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import coefficients, values_of
 
-__all__ = ["derived_marginal", "modulus", "modulus_moments", "modulus_symbols"]
-
-
 STRETCH_STEP = 1e-3
 """Step of the stretch for the initial slope."""
 LEAST_BANDWIDTH = 1e-6

@@ -12,8 +12,6 @@ from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning, Severity, has_code
 
-__all__ = ["STEPS", "Step", "next_step"]
-
 
 class Step(NamedTuple):
     """What to do next, as typed in a shell (``{run}`` stands for the folder of the run) and in Python."""

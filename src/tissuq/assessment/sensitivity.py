@@ -13,9 +13,6 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior, Uniform
 from tissuq.prediction.densities import joint_log_likelihood, stride
 
-__all__ = ["SCALE_FACTORS", "PowerScaling", "known_evidence_changes", "power_scaling", "rescaled", "scale_symbols"]
-
-
 SCALE_FACTORS: dict[str, float] = {"quarter": 0.25, "fourfold": 4.0}
 """Factors of the prior scales of the discrepancy's amplitudes for which the influence of these priors is given."""
 POWERS = (0.99, 1.01)

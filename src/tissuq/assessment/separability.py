@@ -9,9 +9,6 @@ from tissuq.inference.solution import Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import coefficients, values_of
 
-__all__ = ["inseparable_parameters"]
-
-
 COMPONENTS = 4
 """Places of the posterior at which the stresses are looked at."""
 STEP = 1e-4

@@ -13,8 +13,6 @@ from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["shares_of_discrepancy"]
-
 Share: TypeAlias = tuple[float, float, float]
 """Mean, and ends of the 95 % interval."""
 

@@ -23,23 +23,6 @@ from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = [
-    "MIN_LOSS_PROBABILITY",
-    "Loss",
-    "Stability",
-    "StableRange",
-    "are_stable",
-    "calibrated_range",
-    "is_calibrated",
-    "measured_range",
-    "measured_states",
-    "stability",
-    "stability_modes",
-    "stability_over",
-    "stable_draws",
-    "stable_ranges",
-]
-
 Curves = Callable[[States], FloatArray]
 
 STABILITY_DRAWS, POINTS_PER_SIDE = 500, 31

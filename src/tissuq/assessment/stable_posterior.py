@@ -18,9 +18,6 @@ from tissuq.inference.solution import Marginals, Solution, shares_of_members
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import values_of
 
-__all__ = ["ALL_MODES", "modes_named", "stable_part"]
-
-
 ALL_MODES = "all"
 """Name that stands for every loading mode."""
 MIN_STABLE_DRAWS, MAX_ROUNDS, MIN_ROUNDS = 1000, 250, 10

@@ -21,22 +21,6 @@ from tissuq.model.tolerances import AS_TESTED, TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity, symbols_in
 
-__all__ = [
-    "COMPUTING",
-    "MIN_INSIDE",
-    "MIN_OFTEN_STABLE",
-    "MIN_STABLE",
-    "PRECISE",
-    "SPREAD",
-    "UNKNOWN",
-    "Use",
-    "Verdict",
-    "precision_of",
-    "relative_half_width",
-    "uses_of",
-    "worst_of",
-]
-
 PRECISE, USEFUL = 0.2, 0.5
 """Half widths of 95 % intervals, over the mean, up to which a number is precise, and of use."""
 MIN_INSIDE = 0.9

@@ -21,9 +21,6 @@ from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, MeshSize, lines_of
 from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Values, unknown_set
 from tissuq.errors import InputError
 
-__all__ = ["AbaqusDeck", "AbaqusResults", "Keyword", "keywords_of"]
-
-
 ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
 """Options of a material that a card replaces."""
 DEPENDENT = {

@@ -16,9 +16,6 @@ from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, decoded, lines_of
 from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
 
-__all__ = ["AnsysDeck", "AnsysResults"]
-
-
 ELASTIC_TABLES = {"HYPE", "ELAS", "ANEL", "AHYP"}
 """Tables (TB) that a card replaces, by the four letters that the program reads."""
 OTHER_TABLES = {"DENS", "CTE", "THER", "SPEC", "SDAM"}

@@ -16,9 +16,6 @@ from tissuq.arrays import FloatArray
 from tissuq.decks.result_file import SAME_TIME, ResultFile, Values
 from tissuq.errors import InputError
 
-__all__ = ["CELL_TYPES", "SECTORS_OF_RING", "CalculiXResults", "Frd", "Table", "read_dat", "read_frd", "tensor_of"]
-
-
 TABLE = re.compile(
     r"^\s*(?P<what>[a-z][a-z ]*?)\s*\((?P<columns>[^)]*)\) for set (?P<set>\S+) and time\s+(?P<time>\S+)"
 )

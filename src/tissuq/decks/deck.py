@@ -16,11 +16,6 @@ from typing import ClassVar, NamedTuple
 from tissuq.errors import InputError
 from tissuq.registry import find, variants
 
-__all__ = [
-    "MORE_THAN_ELASTIC", "Deck", "DeckFormat", "DeckMaterial", "Line", "MeshSize", "deck_formats", "decoded", "encoded",
-    "lines_of",
-]  # fmt: skip
-
 CONTEXT = 3
 """Lines around a difference that are shown."""
 HUNK = re.compile(r"( [-+])(\d+)")

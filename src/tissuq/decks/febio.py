@@ -10,8 +10,6 @@ from xml.parsers.expat import ExpatError, ParserCreate
 from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, MeshSize, decoded
 from tissuq.errors import InputError
 
-__all__ = ["FEBioDeck"]
-
 TYPE = re.compile(r"""(\stype\s*=\s*)("[^"]*"|'[^']*')""")
 DENSITY = re.compile(r"<density\b[^>]*>[^<]*</density>")
 SHARED = "rigid body"

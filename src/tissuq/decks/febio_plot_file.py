@@ -17,9 +17,6 @@ from tissuq.arrays import FloatArray
 from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
 
-__all__ = ["FEBioResults", "PlotFile", "read_plot_file"]
-
-
 # The facts of the format are those of FEBio's source, github.com/febiosoftware/FEBio at 0e8b7db: tags and what is
 # written below them in FEBioPlot/FEBioPlotFile.h and .cpp, chunks and their compression in FEBioPlot/PltArchive.h and
 # .cpp, types and storage in FECore/fecore_enum.h, the order of a tensor in FECore/FEDataStream.h.

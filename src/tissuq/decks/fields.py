@@ -13,8 +13,6 @@ from tissuq.arrays import FloatArray
 from tissuq.decks.calculix_results import Frd, tensor_of
 from tissuq.decks.quantity import Curve, von_mises
 
-__all__ = ["FinalFields", "element_invariants", "final_fields", "share_beyond"]
-
 
 @dataclass(frozen=True)
 class FinalFields:

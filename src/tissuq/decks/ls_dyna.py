@@ -7,8 +7,6 @@ from itertools import pairwise
 
 from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, Line, lines_of
 
-__all__ = ["LSDynaDeck"]
-
 NOT_ELASTIC = ("*MAT_ADD", "*MAT_THERMAL", "*MAT_NONLOCAL")
 """Keywords that belong to another one, or to the temperature."""
 VISCOELASTIC = re.compile(r"VISCO|CREEP|_0?(06|61|76|92|134|164|175|176)(?!\d)")

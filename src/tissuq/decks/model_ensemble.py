@@ -28,9 +28,6 @@ from tissuq.posterior.ensemble import Ensemble
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["FailedRun", "ModelEnsemble", "gathered", "on_common_times"]
-
-
 TIMES = 41
 """Common times of curves whose solver chose its increments draw by draw."""
 MIN_VALUE = 1e-3

@@ -13,8 +13,6 @@ from pathlib import Path
 from tissuq.decks.deck import Deck
 from tissuq.errors import InputError
 
-__all__ = ["MODEL", "copy_model", "extra_files", "stored_place"]
-
 MODEL = "model"
 """Folder with copies of the files of the model."""
 OUTSIDE = "outside.json"

@@ -24,10 +24,6 @@ from tissuq.decks.result_file import ALL, Results, unknown_set
 from tissuq.decks.solver import LOG, CalculiXSolver, Solver
 from tissuq.errors import InputError
 
-__all__ = [ "FIELDS", "USUALLY", "ModelRun", "SolverRun", "carried_out", "check_sets", "clear_unfinished",
-    "problem_of", "sets_of",
-]  # fmt: skip
-
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
 FIELDS = "fields.npz"

@@ -16,9 +16,6 @@ from tissuq.decks.result_file import ALL, TENSOR, Results, result_files
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import UserCode
 
-__all__ = ["Component", "Curve", "FunctionQuantity", "Quantity", "parse_quantity", "von_mises"]
-
-
 SPECIFICATION = re.compile(r"(?P<component>[A-Za-z]+\d*)(@(?P<set>[^:]+))?(:(?P<how>\w+))?")
 HOW_TO_WRITE = "write NAME=RF3@SET, NAME=U2@SET:max, NAME=S11@SET, NAME=MISES@SET:max, or NAME=file.py:function"
 OWN_FUNCTION = "give it by a function of yours, NAME=file.py:function"

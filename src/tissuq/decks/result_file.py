@@ -17,9 +17,6 @@ from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.registry import plugins, variants
 
-__all__ = ["ALL", "AS_TENSOR", "SAME_TIME", "TENSOR", "ResultFile", "Results", "Values", "result_files", "unknown_set"]
-
-
 ALL = "ALL"
 """The set of all nodes, where none is named."""
 TENSOR = ("11", "22", "33", "12", "13", "23")

@@ -17,8 +17,6 @@ from typing import ClassVar
 from tissuq.errors import InputError
 from tissuq.registry import find, variants
 
-__all__ = ["LOG", "CalculiXSolver", "CommandSolver", "FEBioSolver", "Outcome", "Solver", "solver_for"]
-
 LOG = "solver.log"
 """What the solver said, in the folder of its run."""
 LAST_LINES = 12

@@ -19,18 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = [
-    "Panels",
-    "columns_of",
-    "legend_above",
-    "limits_of",
-    "on_figure",
-    "panels",
-    "shortened",
-    "small_panels",
-    "within",
-]
-
 MAX_COLUMNS = 3
 """Panels side by side."""
 PANEL_HEIGHT, STRIP_HEIGHT, LEGEND_HEIGHT = 2.1, 0.75, 0.5

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
 
-__all__ = ["band", "cut_off", "density", "forest", "heat", "line", "outside", "points", "rows"]
-
-
 EDGE = "end of the measured strains"
 """What the dashed line is where a hatched part begins."""
 Ways = Sequence[tuple[IndexArray | slice, bool]]

@@ -11,25 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "ANSWER_WIDTH",
-    "BAND",
-    "BASE",
-    "COLUMN",
-    "INK",
-    "MARKERS",
-    "PAGE",
-    "PAPER",
-    "SERIES",
-    "STYLE",
-    "TRUTH",
-    "UNSTABLE",
-    "inline_svg",
-    "new_figure",
-    "relative_size",
-    "save_figure",
-]
-
 INK, BAND, BASE, TRUTH, UNSTABLE = "#222222", "#0072B2", "#8a8a8a", "#D55E00", "#E69F00"
 """What was measured; what is predicted; what is for orientation; what else is compared; where stability is lost."""
 SERIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -17,9 +17,6 @@ from tissuq.emulation.runs import ForwardRuns, PointSet, space_filling
 from tissuq.errors import InputError
 from tissuq.parameters.checks import check_seed
 
-__all__ = ["EmulationSettings", "Runner", "calibrated"]
-
-
 Runner = Callable[[FloatArray], ForwardRuns]
 """A function that runs a forward model at parameters (N, d)."""
 

@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.posterior.posterior import Posterior
 
-__all__ = ["Calibration", "labelled_arrays"]
-
-
 PREDICTION_DRAWS = 1000
 """Number of draws of the posterior in predictions."""
 ERROR_DRAWS = 128

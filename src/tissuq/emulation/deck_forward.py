@@ -34,9 +34,6 @@ from tissuq.experiments.units import FORCE, LENGTH, PRESSURE
 from tissuq.export import CardFormat, Cards, CardSettings, FECode, card_format, check_fibres
 from tissuq.mechanics import Material, material_named
 
-__all__ = ["DeckForward", "check_unit_of_function", "conversion"]
-
-
 SOLVED = "solver"
 """Folder with a folder for each run of the solver."""
 ALLOWED_VALUE = 0.1

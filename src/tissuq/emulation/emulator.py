@@ -31,9 +31,6 @@ from tissuq.parameters.priors import Prior
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
-
-
 LEADING_DIRECTIONS = 2
 """Number of directions of the outputs for which coordinates are chosen."""
 LOW_PROBABILITY, MAX_DISTANCE_BELOW = 1e-4, 0.25

@@ -19,17 +19,6 @@ from tissuq.emulation.function_digest import function_digest
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.mechanics.user_law import UserCode
 
-__all__ = [
-    "CallableForward",
-    "FileForward",
-    "Forward",
-    "SeveralModels",
-    "UmbridgeForward",
-    "UnreadableError",
-    "as_forward",
-]
-
-
 ADVICE = (
     "Write a function forward(parameters) of a dictionary of parameters by name, or forward(parameters, control), that "
     "returns an output for every measurement"

@@ -12,9 +12,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["function_digest"]
-
-
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, PurePath)
 """Values that are what they look like."""
 PLACES = 16

@@ -17,20 +17,6 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.inference.quasi_monte_carlo import quasi_random
 
-__all__ = [
-    "Kernel",
-    "Kriging",
-    "LengthScales",
-    "Mode",
-    "Trend",
-    "correlation",
-    "fitted",
-    "leave_one_out",
-    "moments",
-    "trend_basis",
-]
-
-
 Kernel = Literal["squared-exponential", "matern-5/2"]
 Trend = Literal["constant", "linear", "quadratic"]
 

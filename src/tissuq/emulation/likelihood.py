@@ -22,9 +22,6 @@ from tissuq.parameters.priors import Prior
 
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
-__all__ = ["Likelihood"]
-
-
 BLOCK_SIZE = 256
 """Number of parameter settings computed at once, which bounds the memory."""
 ROUNDING_SHARE = 1e-9

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from tissuq.emulation.problem import Problem
     from tissuq.emulation.sampling import SampledPosterior
 
-__all__ = ["card_material", "check_material", "material_posterior", "points_of_range"]
-
 POINTS = 20
 """Number of stretches that stand for the range."""
 NOISE_SHARE = 1e-6

@@ -10,9 +10,6 @@ import numpy as np
 
 from tissuq.arrays import BoolArray, FloatArray
 
-__all__ = ["OutputBasis", "basis_of", "has_signs", "output_moments"]
-
-
 MAX_TRUNCATED_SHARE = 1e-10
 """Largest share of the outputs' variance in the directions that are truncated."""
 MAX_LOG_VARIANCE = 10.0

@@ -21,9 +21,6 @@ from tissuq.parameters.checks import check_priors
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, LogNormal, Normal, Prior
 
-__all__ = ["DISCREPANCIES", "Method", "PriorCorrelation", "Problem", "correlated", "is_far", "pose", "symbol_of"]
-
-
 Method = Literal["auto", "importance", "nuts"]
 """Method that finds the posterior: importance sampling, NUTS, or (auto) NUTS where importance sampling fails."""
 

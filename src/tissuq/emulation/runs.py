@@ -17,19 +17,6 @@ from tissuq.emulation.problem import PriorCorrelation
 from tissuq.errors import InputError
 from tissuq.parameters.priors import Prior
 
-__all__ = [
-    "FIRST_RUNS",
-    "EmulatorCheck",
-    "ForwardRun",
-    "ForwardRuns",
-    "PointSet",
-    "carry_out",
-    "check_first_runs",
-    "gathered",
-    "space_filling",
-]
-
-
 PointSet = Literal["sobol", "latin"]
 """Scrambled Sobol points, or a Latin hypercube whose points stay apart."""
 

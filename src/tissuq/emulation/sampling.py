@@ -19,9 +19,6 @@ from tissuq.inference.proposal_mixture import weighted_points
 from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, adapted, effective, log_normal, systematic
 from tissuq.parameters.priors import Prior
 
-__all__ = ["SampledPosterior", "sample_posterior"]
-
-
 SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 16, 32
 """Points of a search round; points of a sampling round, the number of these, and where it does not suffice, at most."""
 MIN_EFFECTIVE_POINTS = 800

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from tissuq.emulation.likelihood import Likelihood
     from tissuq.emulation.sampling import SampledPosterior
 
-__all__ = ["NO_PARAMETERS_FIT", "calibration_warnings"]
-
 Ends = list[tuple[str, str]]
 """Parameters, and of each the lower or the upper end."""
 

@@ -17,23 +17,6 @@ from tissuq.export.states import SeenStates
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.registry import find, variants
 
-__all__ = [
-    "NEARLY",
-    "CardFormat",
-    "CardSettings",
-    "Cards",
-    "UnitSystem",
-    "calibrated_stretches",
-    "card_format",
-    "card_formats",
-    "distances_from_median",
-    "draw_row",
-    "ensemble_lines",
-    "file_name",
-    "origin_sentences",
-    "words_of",
-]
-
 
 class UnitSystem(NamedTuple):
     """The units of a finite-element model that are consistent with one of stress, and the density of water in them."""

@@ -42,9 +42,6 @@ from tissuq.mechanics import Material
 from tissuq.mechanics.laws import MaterialSum
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = ["Card", "FECode"]
-
-
 COMMENT_WIDTH = 110
 """Largest number of characters in a line of comment."""
 

@@ -15,9 +15,6 @@ from tissuq.export.states import PrincipalStates, SeenStates, are_stable, mode_s
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = ["REACHES", "DrawStresses", "Judged", "within"]
-
-
 REACHES = (1.0, 1.25, 1.5)
 """Multiples of the measured I1 - 3 and I2 - 3 up to which errors of cards are stated; cards are fitted to the last."""
 MIN_RELATIVE_STRESS = 0.01

@@ -12,16 +12,6 @@ from tissuq.export.laws import Constants, Form, MixtureForm, summands
 from tissuq.mechanics import FibreMaterial, Material
 from tissuq.mechanics.laws import DispersedFibres, ExponentialFibres, Rivlin, StandardFibres
 
-__all__ = [
-    "CALCULIX_PREFIX",
-    "FIBRE_AXES",
-    "FibreForm",
-    "check_fibres",
-    "directions",
-    "fibre_sentences",
-    "initial_stiffness",
-]
-
 CALCULIX_PREFIX = "ELASTIC_FIBER"
 """What the name of a material begins with that CalculiX takes for one with fibres."""
 QUADRATIC_RATE = 1e-6

@@ -24,8 +24,6 @@ from tissuq.export.projection import (
 )
 from tissuq.mechanics.laws import Gent, VanDerWaals, VerondaWestmann
 
-__all__ = ["Abaqus", "Ansys", "CalculiX", "FEBio", "LSDyna"]
-
 ABAQUS_POLYNOMIAL = "sum of C_ij (I1 - 3)^i (I2 - 3)^j"
 ABAQUS_OGDEN = "sum of 2 mu_i/alpha_i^2 (l1^alpha_i + l2^alpha_i + l3^alpha_i - 3)"
 ABAQUS_LINE = 8

@@ -16,9 +16,6 @@ from tissuq.export.states import are_stable
 from tissuq.posterior.draws_in_words import named_draws
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = ["JudgedLaw"]
-
-
 TOO_FAR = 0.1
 """Root mean square error of the stresses that were measured above which a card does not stand for its draw."""
 MIN_STABLE_SHARE = 0.9

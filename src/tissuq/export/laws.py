@@ -26,22 +26,6 @@ from tissuq.mechanics.laws import (
 )
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
-__all__ = [
-    "Constants",
-    "Form",
-    "Law",
-    "LibraryForm",
-    "MixtureForm",
-    "OgdenForm",
-    "PolynomialForm",
-    "exact_law",
-    "fibres_among",
-    "matrix_and_fibres",
-    "parts_of",
-    "sum_of",
-    "summands",
-]
-
 Constants = dict[str, float]
 
 POLYNOMIALS = Biderman, Isihara, MooneyRivlin, NeoHookean, Rivlin, Yeoh

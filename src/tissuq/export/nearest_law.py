@@ -11,17 +11,6 @@ from tissuq.arrays import FloatArray
 from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.stability_rows import Inequalities, StabilityRows
 
-__all__ = [
-    "WANTED_ERROR",
-    "Candidate",
-    "constrained_least_squares",
-    "fit_within",
-    "least_squares",
-    "nearest_values",
-    "squared_distance",
-]
-
-
 WEIGHTS_BEYOND = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Weights of states beyond the measured ones, of which the heaviest is taken that costs little inside."""
 WANTED_ERROR = 0.01

@@ -22,18 +22,6 @@ from tissuq.export.states import SHEARS, PrincipalStates, initial_slope
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.laws import Ogden, Rivlin
 
-__all__ = [
-    "MixtureFit",
-    "OgdenFit",
-    "PolynomialFit",
-    "Projection",
-    "ReducedFit",
-    "full_terms",
-    "projections",
-    "reduced_terms",
-]
-
-
 LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
 """Multiples of one step among which Ogden's exponents are chosen."""
 SINGLE_TERM_LADDER = tuple(step / 16 for step in range(-64, 65) if step)

@@ -14,8 +14,6 @@ from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.mechanics.rays import through
 
-__all__ = ["Inequalities", "StabilityRows", "StabilityStates", "least_eigenvalues", "wanted_stiffness"]
-
 Inequalities = tuple[FloatArray, FloatArray]
 """Rows (m, k) and bounds (m,): rows x >= bounds."""
 

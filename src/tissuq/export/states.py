@@ -16,18 +16,6 @@ from tissuq.export.laws import matrix_and_fibres
 from tissuq.mechanics.arithmetic import exp, library
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = [
-    "ANGLES",
-    "PrincipalStates",
-    "SeenStates",
-    "are_stable",
-    "initial_slope",
-    "mode_stretches",
-    "moduli",
-    "states_between",
-]
-
-
 ANGLES = (1.0, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 59.0)
 """Lode angles in degrees: from uniaxial tension, 0, by planar tension, 30, to equibiaxial tension, 60.
 

@@ -21,9 +21,6 @@ from tissuq.export.cards import (
 from tissuq.export.states import SeenStates, moduli
 from tissuq.posterior.ensemble import Ensemble
 
-__all__ = ["Table"]
-
-
 ANGLES = (0.02, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 59.98)
 """Lode angles, degrees; the ends are so near to uniaxial and equibiaxial tension that nothing of note has changed."""
 COLUMNS = ("lode_angle", "l1", "l2", "l3", "I1", "I2", "W1", "W2", "cauchy_1_less_3", "cauchy_2_less_3")

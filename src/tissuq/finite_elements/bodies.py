@@ -12,8 +12,6 @@ from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import ACROSS, AXIAL, Case, Mesh, RigidTip, Supports
 
-__all__ = ["ClampedBar", "Indentation", "PlateWithHole", "SphericalIndentation", "graded", "grid"]
-
 ROUNDING = 1e-9
 """Distance over the size of a body up to which a point lies on a plane."""
 

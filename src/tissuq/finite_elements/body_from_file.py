@@ -19,8 +19,6 @@ from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, Case, Inflation, Mesh, RigidTip, Supports
 from tissuq.finite_elements.mesh_file import AXES, NEARLY, MeshFile, deck_text, read_mesh
 
-__all__ = ["BodyFromFile", "InflatedBody"]
-
 Shape = Literal["axisymmetric", "plane", "solid"]
 
 ORIENTATIONS = {

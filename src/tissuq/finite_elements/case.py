@@ -13,21 +13,6 @@ from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.registry import variants
 
-__all__ = [
-    "ACROSS",
-    "AXIAL",
-    "CELL_KINDS",
-    "Case",
-    "CellKind",
-    "Inflation",
-    "Mesh",
-    "RigidTip",
-    "Supports",
-    "cases",
-    "felupe",
-]
-
-
 AXIAL, ACROSS = 0, 1
 """Columns of points and displacements."""
 

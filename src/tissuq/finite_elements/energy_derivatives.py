@@ -19,8 +19,6 @@ from tissuq.errors import InputError
 from tissuq.mechanics import FibreMaterial
 from tissuq.mechanics.stress import differentiator
 
-__all__ = ["FibreEnergy", "Fibres", "gradient", "gradient_and_hessian", "is_arithmetic"]
-
 IsochoricEnergy = Callable[[tuple[Any, Any, Any]], Any]
 """An energy (n,) of three principal stretches (n,) whose product is one."""
 Fibres = tuple[tuple[FibreMaterial, tuple[float, ...]], ...]

@@ -26,9 +26,6 @@ from tissuq.inference.threads import one_thread
 from tissuq.mechanics.rays import through
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
-__all__ = ["FirstOrder", "FirstOrderError", "controlled", "draws_in_full", "first_order_forces"]
-
-
 EXACT = 1e-12
 """Unevenness below which a draw is proportional to the reference."""
 FAR = 3.0

@@ -14,9 +14,6 @@ from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, Inflation, Mesh, RigidTip, Supports, felupe
 
-__all__ = ["Action", "Contact", "Load", "Pressure", "load_on"]
-
-
 MPA_OF_KPA = 1e-3
 STIFFNESS = 1000.0
 """Pressure in initial shear moduli at a depth of as much as the size of a cell."""

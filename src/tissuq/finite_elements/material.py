@@ -19,17 +19,6 @@ from tissuq.mechanics.material import MaterialSum
 from tissuq.mechanics.stress import differentiator
 from tissuq.posterior.ensemble import EnergyDraw
 
-__all__ = [
-    "DistortionalEnergy",
-    "FElupeMaterial",
-    "distortional_energy",
-    "first_piola_kirchhoff",
-    "principal",
-    "tangent",
-    "volumetric_stress",
-    "volumetric_tangent",
-]
-
 
 class FElupeMaterial:
     """W(J^(-1/3) l1, J^(-1/3) l2, J^(-1/3) l3) + K/2 (J - 1)^2 with the methods that FElupe asks of a material.

@@ -15,8 +15,6 @@ from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import CELL_KINDS
 
-__all__ = ["AXES", "NEARLY", "MeshFile", "deck_text", "read_mesh"]
-
 AXES = "xyz"
 INCLUDE = re.compile(r"^\*INCLUDE\s*,\s*INPUT\s*=\s*(?P<file>[^\n]+)$", re.IGNORECASE | re.MULTILINE)
 ELEMENT_TYPE = re.compile(r"(^\*element\b[^\n]*\btype\s*=\s*)(\w+)", re.IGNORECASE | re.MULTILINE)

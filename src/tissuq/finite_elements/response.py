@@ -21,20 +21,6 @@ from tissuq.inference.threads import one_thread
 from tissuq.mechanics import Material, material_named
 from tissuq.posterior.ensemble import EnergyDraw
 
-__all__ = [
-    "BULK_RATIO",
-    "Response",
-    "Run",
-    "Solve",
-    "bar_force",
-    "case_forces",
-    "indentation_force",
-    "respond",
-    "run_in_turn",
-    "solved",
-]
-
-
 BULK_RATIO = 2000.0
 """Bulk modulus in initial shear moduli: the volume changes by a thousandth where the pressure is two shear moduli."""
 

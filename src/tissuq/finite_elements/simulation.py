@@ -23,18 +23,6 @@ from tissuq.posterior.posterior import Posterior
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "COMPLETE",
-    "FAMILIES",
-    "FINE_MESH",
-    "MATERIAL_ONLY",
-    "WITHOUT",
-    "Simulation",
-    "noise_share",
-    "simulate",
-]
-
-
 COMPLETE, MATERIAL_ONLY, WITHOUT, FINE_MESH = "complete", "alone", "without", "fine"
 """Draws with their discrepancy; the same draws without it; draws of a fit without discrepancy; one on a fine mesh."""
 

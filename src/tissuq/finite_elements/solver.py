@@ -17,8 +17,6 @@ from tissuq.finite_elements.loads import Action, load_on
 from tissuq.finite_elements.material import FElupeMaterial, distortional_energy
 from tissuq.mechanics import Material
 
-__all__ = ["CellFields", "Solver", "StrainPath", "check_bulk_ratio"]
-
 State = tuple[FloatArray, FloatArray, FloatArray]
 
 MAX_HALVINGS = 6

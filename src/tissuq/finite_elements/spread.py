@@ -14,25 +14,6 @@ from tissuq.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "BAND",
-    "PROBABILITY",
-    "SHARES",
-    "SOURCES",
-    "Band",
-    "Shares",
-    "band_of",
-    "band_probability",
-    "force_table",
-    "mesh_factor",
-    "mesh_free",
-    "parts_of",
-    "shares_of",
-    "standard_errors",
-    "too_few_draws",
-]
-
-
 PROBABILITY = 0.95
 MIN_DRAWS_A_COLUMN = 5
 """Draws for every column of a source, below which its part cannot be told."""

@@ -9,8 +9,6 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY,
 from tissuq.finite_elements.spread import shares_of, too_few_draws
 from tissuq.posterior.draws_in_words import failed_draws
 
-__all__ = ["MIN_MESH_CHANGE", "simulation_warnings"]
-
 MIN_ENERGY_SHARE = 0.05
 """Share of the strain energy beyond the measured invariants from which a warning is given."""
 

@@ -13,9 +13,6 @@ from tissuq.inference.nested import MAX_NESTED, nested_draws, nested_log_mass
 from tissuq.inference.quasi_monte_carlo import SHIFTS, quasi_random
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
-__all__ = ["NEGLIGIBLE_MASS", "TOUCHED_MASS", "Boxes", "lower_triangle"]
-
-
 NEGLIGIBLE_MASS = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
 TOUCHED_MASS = 1e-3 * NEGLIGIBLE_MASS

@@ -12,9 +12,6 @@ import numpy as np
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 
-__all__ = ["MAX_RHAT", "Draws", "check_minima", "diagnostic"]
-
-
 MAX_RHAT = 1.01
 """Of any parameter, for draws that count as converged."""
 

@@ -22,16 +22,6 @@ from scipy.special import ndtri
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 
-__all__ = [
-    "Box",
-    "Derivatives",
-    "LogDensity",
-    "Mode",
-    "derivatives_on_line",
-    "find_modes",
-    "log_density_on_line",
-]
-
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
 LogDensity = Callable[[Any], Any]

@@ -19,8 +19,6 @@ from tissuq.inference.reduction import Reducer, divided_columns
 from tissuq.mechanics import traced_stress_basis
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["Density", "conditional_density", "joint_density"]
-
 Density = Callable[[Any, Any], Any]
 """Maps a parameter vector and data to what is known there; one function for all models with the same parts."""
 

@@ -13,9 +13,6 @@ from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.marginal import Marginal, marginal_of_mixture
 from tissuq.inference.quasi_monte_carlo import systematic
 
-__all__ = ["CHAINS", "GaussianMixture"]
-
-
 CHAINS, DRAWS = 4, 1000
 """Number of chains of draws from a mixture, and of draws in each chain."""
 NEGLIGIBLE_WEIGHT = 1e-7

@@ -24,19 +24,6 @@ from tissuq.inference.reduction import Reducer, Reduction, Spectrum
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
-__all__ = [
-    "Conditional",
-    "ConditionalGaussian",
-    "Fit",
-    "Integrated",
-    "LinearPriors",
-    "SpectralCovariance",
-    "condition",
-    "integrated",
-    "times_gaussians",
-]
-
-
 MAX_FEW_PARAMETERS = 4
 """Linear parameters up to which NumPy's functions for matrices cost more than the entries one by one."""
 MAX_VARIANCES_AT_ONCE = 4_000_000

@@ -10,21 +10,6 @@ from numpy.typing import ArrayLike
 
 from tissuq.arrays import FloatArray, IndexArray
 
-__all__ = [
-    "HermiteCubics",
-    "Marginal",
-    "blended",
-    "marginal_of_logs",
-    "marginal_of_mixture",
-    "marginal_of_points",
-    "marginal_of_table",
-    "moments_of_values",
-    "refined",
-    "weighted_grid",
-    "widened",
-]
-
-
 TABLE_POINTS = 1001
 """In a table that is smoothed from many values."""
 HDI_STARTS = 101

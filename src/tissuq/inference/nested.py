@@ -10,8 +10,6 @@ import numpy as np
 from tissuq.arrays import FloatArray
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
-__all__ = ["MAX_NESTED", "nested_draws", "nested_log_density", "nested_log_mass", "nested_points"]
-
 LogDensity = Callable[[FloatArray], FloatArray]
 
 MAX_NESTED = 3

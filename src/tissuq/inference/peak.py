@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-__all__ = ["highest", "top_of_parabola"]
-
 MAX_EVALUATIONS = 20
 
 

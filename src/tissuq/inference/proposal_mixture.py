@@ -9,8 +9,6 @@ import numpy as np
 from tissuq.arrays import FloatArray
 from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, Proposal, log_normal, systematic, tempered
 
-__all__ = ["Mixture", "fitted", "weighted_points"]
-
 Mixture = Sequence[tuple[float, Proposal]]
 """Proposals with their shares, which sum to one."""
 

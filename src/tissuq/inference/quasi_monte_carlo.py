@@ -12,23 +12,6 @@ import numpy as np
 
 from tissuq.arrays import FloatArray, IndexArray
 
-__all__ = [
-    "LOG_OF_NOTHING",
-    "MAX_SEARCHES",
-    "SHIFTS",
-    "Adaptation",
-    "Proposal",
-    "adapted",
-    "effective",
-    "even_points",
-    "log_normal",
-    "quasi_random",
-    "resampled_at_random",
-    "systematic",
-    "tempered",
-]
-
-
 SHIFTS = 8
 """Shifted copies of the quasi-random points, whose spread tells the error (more, where few points count)."""
 

@@ -17,17 +17,6 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK, upper_triangle
 
-__all__ = [
-    "FEW_POINTS",
-    "Reducer",
-    "Reduction",
-    "Spectrum",
-    "correlation_spectrum",
-    "divided_columns",
-    "scaled_spectrum",
-]
-
-
 TRUNCATED_VARIANCE_SHARE = 1e-14
 """Share of the process's variance at all points that the factor of many may leave out."""
 MIN_RELATIVE_EIGENVALUE = 1e-17

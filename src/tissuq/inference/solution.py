@@ -18,17 +18,6 @@ from tissuq.model.statistical_model import StatisticalModel
 if TYPE_CHECKING:
     from tissuq.inference.convergence import Draws
 
-__all__ = [
-    "PROBABLE_DIRECTION",
-    "Diagnostics",
-    "Enumerator",
-    "Marginals",
-    "Solution",
-    "are_isotropic",
-    "shares_of_members",
-]
-
-
 NO_ERROR: Mapping[str, float] = {}
 PROBABLE_DIRECTION = 0.5
 """Probability of a preferred direction above which the material counts as one that has it."""

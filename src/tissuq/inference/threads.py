@@ -6,8 +6,6 @@ from contextlib import AbstractContextManager
 from functools import lru_cache
 from typing import Any
 
-__all__ = ["one_thread"]
-
 
 def one_thread() -> AbstractContextManager[Any]:
     """Return a context in which BLAS and LAPACK use one thread."""

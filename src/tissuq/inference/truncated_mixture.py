@@ -26,9 +26,6 @@ from tissuq.inference.nested import MAX_NESTED, nested_log_density, nested_point
 from tissuq.inference.quasi_monte_carlo import quasi_random
 from tissuq.parameters.normal_interval import log_interval
 
-__all__ = ["TruncatedMixture", "checked_masses"]
-
-
 MIN_DRAWS = 4000
 """Draws, at least, that represent what bounds cut, in predictions and a posterior's draws, unless fewer are wanted."""
 MAX_COMPONENTS = 200

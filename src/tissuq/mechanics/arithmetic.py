@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["cos", "exp", "expm1", "library", "log", "log_left", "positive_part", "sin", "sqrt"]
-
 
 def library(value: Any) -> Any:
     """Return the library that an array belongs to: NumPy for plain numbers."""

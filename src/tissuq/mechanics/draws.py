@@ -13,17 +13,6 @@ from tissuq.mechanics.arithmetic import exp, library, log
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.rays import DIRECTIONS, Range, Rays, direction_of, direction_of_angle, ends_of, log_growth
 
-__all__ = [
-    "Continuation",
-    "Pieces",
-    "PiecewiseEnergy",
-    "continuations",
-    "pieces",
-    "rays_to_ends",
-    "sum_of_energies",
-]
-
-
 SHARES, WEIGHTS = 0.5 * (np.polynomial.legendre.leggauss(8) + np.array([[1.0], [0.0]]))
 """Nodes and weights of the integral over s, from 0 to 1."""
 ANY_STRETCHES = (1.25, 1.0, 0.8)

@@ -13,8 +13,6 @@ from tissuq.experiments.modes.path import STEP
 from tissuq.mechanics.arithmetic import exp, library, log, sqrt
 from tissuq.mechanics.material import Material
 
-__all__ = ["energy_in_equilibrium", "has_free_axis", "in_equilibrium", "why_no_equilibrium"]
-
 WIDEST = 4.0
 """Largest distance of the logarithm of the lateral stretch from that of an isotropic material."""
 HALVINGS, NEWTON_STEPS = 16, 3

@@ -10,9 +10,6 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.modes import LoadingMode, States
 
-__all__ = ["MeasuredStates", "farthest_stretch", "invariant_rates", "invariants", "largest_invariants"]
-
-
 LARGEST_STRETCH = 10.0
 """Stretch, or one over it, beyond which no range is followed."""
 ROUNDING = 1e-9

@@ -17,8 +17,6 @@ from tissuq.experiments.modes import Deformation
 from tissuq.parameters.parameter import Parameter
 from tissuq.registry import variants
 
-__all__ = ["SUMS", "Material", "MaterialSum", "StretchMaterial", "axes_felt_by", "materials"]
-
 SUMS = {
     "standard-reinforcing": "neo-hookean+standard-fibres",
     "holzapfel-gasser-ogden": "neo-hookean+exponential-fibres",

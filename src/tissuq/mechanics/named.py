@@ -10,8 +10,6 @@ from tissuq.mechanics.material import SUMS, Material, MaterialSum
 from tissuq.mechanics.user_law import UserCode, as_material, load_material
 from tissuq.registry import find, load_plugins, variants
 
-__all__ = ["FORMS", "material_named", "plugins", "standard_name"]
-
 FAMILIES = Rivlin, Ogden, FibreMaterial
 FORMS = (
     *(family.form for family in FAMILIES),

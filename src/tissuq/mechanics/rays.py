@@ -18,25 +18,6 @@ from tissuq.arrays import FloatArray, IndexArray
 from tissuq.experiments.modes import Deformation, Path, States
 from tissuq.mechanics.arithmetic import cos, exp, sin
 
-__all__ = [
-    "DIRECTIONS",
-    "MAX_CORNER_EXCESS",
-    "Range",
-    "Rays",
-    "direction_of",
-    "direction_of_angle",
-    "dispersed",
-    "drawn_back",
-    "ends_of",
-    "log_growth",
-    "scores",
-    "share_to_end",
-    "share_within",
-    "through",
-    "with_errors",
-]
-
-
 DIRECTIONS = np.linspace(-1, 1, 801)
 """Of rays: c = 3 sqrt(6) e1 e2 e3 / |e|^3; 1 in uniaxial tension, 0 in planar, -1 in equibiaxial tension."""
 ANGLES = 1920

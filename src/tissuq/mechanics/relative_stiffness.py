@@ -12,8 +12,6 @@ from tissuq.mechanics.material import Material, MaterialSum
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform
 
-__all__ = ["RelativeStiffness", "for_states"]
-
 RATIO = LogUniform(0.01, 1000.0)
 """The default prior of the stiffness of fibres over that of the matrix."""
 

@@ -15,8 +15,6 @@ from tissuq.mechanics.material import Material
 from tissuq.mechanics.named import material_named
 from tissuq.mechanics.stress import engineering_stress
 
-__all__ = ["simulate"]
-
 
 def simulate(
     material: str | Material,

@@ -17,19 +17,6 @@ from tissuq.experiments.modes.path import STEP, UNMEASURED, Deformation
 from tissuq.mechanics.equilibrium import energy_in_equilibrium, has_free_axis
 from tissuq.mechanics.material import Material
 
-__all__ = [
-    "MAX_COMPLEX_STEP_VALUES",
-    "complex_step_stress",
-    "engineering_stress",
-    "initial_shear_modulus",
-    "path_energy",
-    "stress_basis",
-    "stresses_at",
-    "stresses_by_basis",
-    "traced_stress_basis",
-]
-
-
 MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 """Number of stresses from which compiling their derivatives takes less time, and of those that are computed at once."""
 REAL_STEPS = (1e-5, 1e-6, 1e-7)

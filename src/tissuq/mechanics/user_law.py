@@ -34,18 +34,6 @@ from tissuq.mechanics.stress import (
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior
 
-__all__ = [
-    "LAW",
-    "Check",
-    "FunctionLaw",
-    "UserCode",
-    "as_material",
-    "checked",
-    "load_material",
-    "values_within_reach",
-]
-
-
 LAW = re.compile(r"(?P<path>.+\.py):(?P<name>\w+)")
 """The file and the name in it."""
 ARGUMENTS = ("I1", "I2"), ("l1", "l2", "l3")

@@ -17,9 +17,6 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
 from tissuq.model.tolerances import Tolerances
 
-__all__ = ["check_angles", "check_lateral_stretch", "check_linearity", "check_parts", "check_separable"]
-
-
 ANGLES = (0.0, np.pi / 2)
 """Between which angles of fibres lie."""
 NO_STRESS = 1e-12

@@ -17,9 +17,6 @@ from tissuq.model.measurement_errors import ErrorPoints, Shared
 from tissuq.model.noise import Noise, stress_level
 from tissuq.model.tolerances import FittedErrors, Tolerances, specimens_of
 
-__all__ = ["ErrorModel", "Whitening", "whitening", "widening_of_lag"]
-
-
 NEGLIGIBLE_SPREAD, ROUNDING = 1e-9, 1e-14
 """Variance of a shared error over that of the noise, and over the largest one, below which it is left out."""
 

@@ -12,17 +12,6 @@ from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import LoadingMode
 from tissuq.registry import plugins, variants
 
-__all__ = [
-    "ErrorPoints",
-    "MeasurementError",
-    "ResolutionError",
-    "ScaleError",
-    "Shared",
-    "TestError",
-    "measurement_errors",
-]
-
-
 Shared = Literal["specimens' differences", "tests' differences", "specimen", "test"]
 
 CORRELATION_SHARE = 1 / 3

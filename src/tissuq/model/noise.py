@@ -20,20 +20,6 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 from tissuq.registry import find, plugins, variants
 
-__all__ = [
-    "AutoregressiveNoise",
-    "IndependentNoise",
-    "KnownNoise",
-    "KnownNoises",
-    "Noise",
-    "ProportionalNoise",
-    "RepeatNoise",
-    "UnknownNoise",
-    "noise_named",
-    "stress_level",
-]
-
-
 MIN_SD_MPA, MAX_SD_MPA = 1e-150, 1e150
 """Known standard deviations whose squares can be computed lie between these."""
 NOISE_SD = Parameter.scale("noise_sd", "standard deviation of the measurement noise")

@@ -8,8 +8,6 @@ from tissuq.arrays import FloatArray
 from tissuq.errors import ModelError
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["draw_from_prior"]
-
 
 def draw_from_prior(model: StatisticalModel, generator: np.random.Generator) -> tuple[dict[str, float], FloatArray]:
     """Return values of all parameters, drawn from their priors, and the measured stress (n,), MPa, that they lead to.

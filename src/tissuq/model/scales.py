@@ -14,9 +14,6 @@ from tissuq.mechanics.invariants import invariant_rates, largest_invariants
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, Uniform
 
-__all__ = ["MAX_SCORE", "at_scores", "default_boxes", "default_prior", "off_zero", "support"]
-
-
 MAX_SCORE = 8.0
 """Standard deviations beyond which probabilities round to one."""
 BOX_MARGIN = 10.0

@@ -28,9 +28,6 @@ from tissuq.model.tolerances import FittedErrors, Tolerances
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["StatisticalModel"]
-
-
 BENT_QUANTILES = (0.001, 0.1, 0.5, 0.9, 0.999)
 """Probabilities of the exponents' priors at which the size of a box is judged."""
 MAX_REMEMBERED_SIZE = 2000

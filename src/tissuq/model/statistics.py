@@ -14,9 +14,6 @@ from numpy.polynomial.chebyshev import chebvander
 
 from tissuq.arrays import FloatArray, IndexArray
 
-__all__ = ["CHUNK", "Condensed", "Statistics", "condensed", "is_condensed", "upper_triangle"]
-
-
 CHUNK = 16_384
 """Measurements taken in at once: what bounds the memory."""
 NODES_PER_PIECE = 24

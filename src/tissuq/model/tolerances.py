@@ -25,20 +25,6 @@ from tissuq.model.measurement_errors import (
 )
 from tissuq.registry import find, variants
 
-__all__ = [
-    "AS_TESTED",
-    "BETWEEN_SPECIMENS",
-    "CONTRADICTION_SPREAD",
-    "ESTIMANDS",
-    "SPECIMEN",
-    "TISSUE",
-    "FittedErrors",
-    "Tolerances",
-    "estimands",
-    "specimens_of",
-]
-
-
 CONTRADICTION_SPREAD = 0.3
 """Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
 has one of 0.42, as that of the moduli in shear and in tension or compression of 15 isotropic tissues."""

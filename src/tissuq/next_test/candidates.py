@@ -22,23 +22,6 @@ from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch, invari
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import values_of
 
-__all__ = [
-    "EXTENDED_REACH",
-    "MODULUS",
-    "Candidate",
-    "ModulusTarget",
-    "ParameterTarget",
-    "StressTarget",
-    "Stresses",
-    "Target",
-    "candidate_named",
-    "default_candidates",
-    "farthest_range",
-    "reach_of",
-    "target_named",
-]
-
-
 MIN_POINTS, MAX_POINTS = 10, 40
 """Smallest and largest number of measurements of a default candidate, which otherwise has as many as the data."""
 EXTENDED_REACH = 1.5

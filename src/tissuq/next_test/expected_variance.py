@@ -29,8 +29,6 @@ from tissuq.prediction.moments import (
     energy_terms,
 )
 
-__all__ = ["Variances", "expected_variances", "joint_stresses", "states_of"]
-
 
 def states_of(model: StatisticalModel, stresses: Sequence[tuple[LoadingMode, FloatArray]]) -> States:
     """Return the states at points of several modes: for all stresses of the first mode, then for those of the next."""

@@ -22,8 +22,6 @@ from tissuq.next_test.candidates import Candidate, Stresses, Target, farthest_ra
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
 from tissuq.prediction.moments import stress_moments, stress_slopes, values_by_symbol
 
-__all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]
-
 Column = tuple[FloatArray, FloatArray]
 
 Specimen = Literal["same", "other"]

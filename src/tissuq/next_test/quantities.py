@@ -14,8 +14,6 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.candidates import Stresses, Target
 
-__all__ = ["QuantityTarget", "quantity_target"]
-
 States = Sequence[tuple[LoadingMode, FloatArray]]
 
 MIN_DRAWS = 8

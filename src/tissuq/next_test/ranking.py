@@ -24,8 +24,6 @@ from tissuq.next_test.next_test import NextTest, Specimen
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["rank_tests"]
-
 MAX_MEASURED_REACH = 1 + 1e-6
 """Largest reach of a stretch whose invariants were measured."""
 TOLD_APART, NEGLIGIBLE = 2.0, 0.01

@@ -7,8 +7,6 @@ from numbers import Integral
 
 from tissuq.errors import InputError
 
-__all__ = ["MAX_SEED", "check_priors", "check_probability", "check_seed"]
-
 MAX_SEED = 2**62
 
 

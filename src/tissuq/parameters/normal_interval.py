@@ -8,9 +8,6 @@ import numpy as np
 
 from tissuq.arrays import BoolArray, FloatArray
 
-__all__ = ["interval_quantile", "log_interval"]
-
-
 ALMOST_NOTHING, ALMOST_ALL = -20.0, 8.5
 """Scores below which the quick Phi soon underflows, and from which it is one in double precision."""
 

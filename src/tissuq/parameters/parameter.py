@@ -8,8 +8,6 @@ from typing import Literal
 
 from tissuq.parameters.priors import Prior, Uniform
 
-__all__ = ["Parameter"]
-
 
 @dataclass(frozen=True)
 class Parameter:

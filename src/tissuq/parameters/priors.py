@@ -18,19 +18,6 @@ from tissuq.errors import InputError
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 from tissuq.registry import find
 
-__all__ = [
-    "Exponential",
-    "Flat",
-    "HalfCauchy",
-    "HalfNormal",
-    "LogNormal",
-    "LogUniform",
-    "Normal",
-    "Prior",
-    "Uniform",
-    "prior_from",
-]
-
 
 @dataclass(frozen=True)
 class Prior(ABC):

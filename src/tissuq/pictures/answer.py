@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["answer", "answer_on_new_figure", "discrepancy_shares", "has_shares", "small_svg"]
-
 PIXELS = 96
 """Of a page, in an inch."""
 WIDE, WIDE_ROW = (1000, 480), 330

@@ -20,19 +20,6 @@ from tissuq.prediction.bands import Band, inside_band, predict_bands
 from tissuq.prediction.moments import drawn_curves
 from tissuq.prediction.scores import root_mean_square
 
-__all__ = [
-    "Described",
-    "Way",
-    "described",
-    "held_along",
-    "is_determined",
-    "points_along",
-    "rows_where_held",
-    "share_along",
-    "ways_of",
-]
-
-
 POINTS, SHARE_POINTS, SHARE_DRAWS = 101, 41, 800
 """Points of a band and of a share along a curve, and draws of the latter."""
 RETURN, JUMP, MOST_WAYS = 0.3, 5.0, 7

@@ -20,15 +20,6 @@ from tissuq.parameters.priors import Prior
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "MODULUS",
-    "intervals",
-    "marginal_of",
-    "marginals",
-    "parameters_to_show",
-    "ridges",
-]
-
 MODULUS = "initial shear modulus"
 """In place of a parameter's symbol."""
 VALUES = 400

@@ -26,9 +26,6 @@ from tissuq.prediction.bands import Band, predict_bands, speaks_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Measured", "Predicted", "curves", "draw_predicted", "predicted_limits", "prediction", "predictions"]
-
-
 POINTS = 121
 """Of a band, unless they are given."""
 REACH = 0.35

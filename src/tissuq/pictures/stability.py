@@ -14,8 +14,6 @@ from tissuq.inference.solution import Solution
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["shade_instability", "stability"]
-
 POINTS = 61
 """Stretches of a mode."""
 LEAST_SHOWN = 80.0

@@ -23,18 +23,6 @@ from tissuq.population.uses import NOT_PREDICTED, share_of_initial_stiffness, us
 from tissuq.prediction.bands import Band, asked_for
 from tissuq.result_warning import has_code
 
-__all__ = [
-    "MODULUS",
-    "PopulationAnswer",
-    "PopulationEstimate",
-    "about_law",
-    "about_modulus",
-    "answer_of_population",
-    "headline",
-    "share_of_discrepancy",
-    "use_of_law_alone",
-]
-
 MODULUS = "initial shear modulus"
 ENDS = ("hdi_low", "hdi_high")
 POINTS = 41

@@ -16,8 +16,6 @@ from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import number_in
 
-__all__ = ["Covariate", "Covariates", "LevelCovariate", "NumberCovariate", "Place", "covariates_of"]
-
 Place: TypeAlias = Callable[[str, str], str]
 """Where the value of a specimen (or of none: an empty text) and of a covariate (likewise) stands, for messages."""
 

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["ALL_COVARIATES", "INTERVAL_COLUMNS", "PopulationDraws", "effect_table", "interval", "labelled_arrays"]
-
-
 INTERVAL_COLUMNS = ["median", "hdi_low", "hdi_high"]
 """What `interval` returns, as tables of a population have it."""
 ALL_COVARIATES = "all covariates"

@@ -31,8 +31,6 @@ from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.population.covariates import Covariates
 from tissuq.population.likelihoods import likelihoods_of
 
-__all__ = ["Hierarchy", "sample_hierarchy"]
-
 NO_COLUMNS: FloatArray = np.zeros(0)
 
 MEAN_PRIOR_SD = 5.0

@@ -24,9 +24,6 @@ from tissuq.inference.solution import Solution
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.moments import values_of
 
-__all__ = ["Coordinates", "Likelihoods", "coordinates_of", "likelihoods_of", "mixtures_of", "on_line", "reduced"]
-
-
 MAX_STEPS = 30
 EDGE_SD = 3.3
 """Standard deviations over which the initial clusters are even, so that tails get clusters of their own."""

@@ -25,9 +25,6 @@ from tissuq.prediction.moments import drawn_curves, values_of
 if TYPE_CHECKING:
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["check_one_control", "matching_draws", "patient_band", "patient_curves", "patient_posterior"]
-
-
 STRETCH_STEP = 1e-3
 """Step of the stretch for the initial slope."""
 MIN_MODULUS_RATIO = 0.1

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-__all__ = ["draw_specimens", "height_of", "numbers_of"]
-
-
 ALONE = "#b8b8b8"
 ENDS = ("hdi_low", "hdi_high")
 COLUMNS = [f"{prefix}{name}" for prefix in ("", "alone_") for name in ("median", *ENDS)]

@@ -26,8 +26,6 @@ from tissuq.posterior.fitting import fit_many
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Method
 
-__all__ = ["MIN_SPECIMENS", "fit_population"]
-
 MIN_SPECIMENS = 3
 """Smallest number of specimens: two determine a difference, but no spread."""
 LEAST_DEFORMATION = 0.01

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from tissuq.inference.enumerators.nuts import NutsDraws
 
-__all__ = ["Population"]
-
 
 class Population(PopulationDraws):
     """What `tissuq.fit_population` returns: no pooling, partial pooling and complete pooling of the same specimens.

@@ -22,9 +22,6 @@ from tissuq.population.likelihoods import mixtures_of
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["MAX_SPECIMENS", "needed_table", "relative_width", "score"]
-
-
 FUTURES = 200
 """Draws of the population from which the measurement goes on."""
 MAX_SPECIMENS = 1000

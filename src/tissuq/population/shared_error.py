@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["biased", "shared_covariance", "width_table"]
-
-
 COMPONENTS, BENT_COMPONENTS = 200, 32
 """Components of a posterior over which covariances given the discrepancy are averaged; of a law with exponents."""
 ROUNDING = 1e-12

@@ -16,15 +16,6 @@ from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import Band
 from tissuq.result_warning import Severity, has_code
 
-__all__ = [
-    "CONTRADICTING",
-    "DEPARTING",
-    "NOT_PREDICTED",
-    "PREDICTING",
-    "share_of_initial_stiffness",
-    "uses_of_population",
-]
-
 PREDICTING = "predict a new specimen"
 NOT_PREDICTED = "its stress cannot be predicted in the modes that were measured; 'Stress of a new specimen' says why"
 CONTRADICTING = "the tests of most specimens contradict each other, so that moduli may be those of none of them"

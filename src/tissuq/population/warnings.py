@@ -8,8 +8,6 @@ from statistics import median
 from tissuq.population.draws import PopulationDraws
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["MIN_EFFECTIVE_SHARE", "far_specimens", "has_few_specimens", "warnings_of"]
-
 MIN_EFFECTIVE_SHARE = 0.5
 """Smallest share of draws that must remain effective when they are corrected."""
 FAR_FACTOR = 50.0

@@ -27,8 +27,6 @@ from tissuq.parameters.priors import prior_from
 from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
 from tissuq.posterior.solver import Solver
 
-__all__ = ["read_modes", "read_solution", "solution_groups", "unreadable"]
-
 T = TypeVar("T", Material, Discrepancy)
 
 MODEL, TESTS = "model", "tests"

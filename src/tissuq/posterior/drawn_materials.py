@@ -24,9 +24,6 @@ from tissuq.parameters.checks import check_seed
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble, stress_of, stress_within
 from tissuq.prediction.moments import values_of
 
-__all__ = ["Sampling", "drawn_ensemble"]
-
-
 Sampling = Literal["sobol", "latin", "random"]
 """How draws spread: a scrambled Sobol sequence, Latin hypercubes, or independently."""
 KNOTS = 1001

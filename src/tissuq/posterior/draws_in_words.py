@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-__all__ = ["MAX_DRAWS_NAMED", "FailedDraw", "failed_draws", "named_draws"]
-
 MAX_DRAWS_NAMED = 6
 """Largest number of draws that a sentence names; a table has all of them."""
 

@@ -30,9 +30,6 @@ from tissuq.mechanics.stress import stresses_at, stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.pictures.prediction import curves
 
-__all__ = ["EnergyDraw", "Ensemble", "stress_of", "stress_within"]
-
-
 PLOT_POINTS = 81
 """Stretches of a picture."""
 

@@ -25,8 +25,6 @@ from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import METHODS, Method, Solver
 
-__all__ = ["fit", "fit_many"]
-
 OPTIONS = ("discrepancy", "material", "noise_sd", "noise", "priors", "tolerances", "method", "stable_in", "seed")
 """Of a fit, beside those of reading."""
 MAX_SIZE = 2000

@@ -18,8 +18,6 @@ from tissuq.parameters.checks import check_probability
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import LeaveOneOut, pointwise_log_likelihood, replicate_data, stride
 
-__all__ = ["labelled_arrays", "labels_of", "prior_arrays", "summaries", "summaries_in"]
-
 OF_VALUES = ("mean", "sd", "median", "hdi_low", "hdi_high")
 """Numbers of a summary that have the unit of their parameter."""
 

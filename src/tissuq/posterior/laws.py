@@ -39,9 +39,6 @@ from tissuq.result_warning import ResultWarning
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["ALL_LAWS", "LawComparison", "LawFit", "fit_laws", "laws_named"]
-
-
 ALL_LAWS = "all"
 """In place of names: every law that is the same in all directions."""
 WITHOUT_EVIDENCE = ("nuts", "joint")

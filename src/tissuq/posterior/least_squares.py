@@ -16,9 +16,6 @@ from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.parameters.priors import Prior
 
-__all__ = ["LeastSquares", "least_squares"]
-
-
 STARTS_PER_PARAMETER, REFINED = 64, 8
 """Values of each nonlinear parameter from which the search starts, and how many of the best go on."""
 MAX_SEARCHED = 2000

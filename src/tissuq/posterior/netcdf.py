@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Group", "LabelledGroup", "opened", "read_groups", "save_groups", "tree_of"]
-
 COMPRESSED_SIZE, SAMPLE_SIZE, MAX_SHRUNK_SHARE = 1000, 4000, 0.75
 """Number of values in an array from which it is compressed, if so many of its values then shrink to such a share."""
 COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}

@@ -19,8 +19,6 @@ from tissuq.pictures.parameters import MODULUS, marginal_of, marginals, paramete
 from tissuq.pictures.prediction import prediction, predictions
 from tissuq.pictures.stability import stability
 
-__all__ = ["ROW", "PosteriorPlots", "plot_compare"]
-
 LETTERS_OF_NAME = 24
 """In a line of the name of a fit that is compared."""
 SMALL_PANEL, ROW = 1.25, 0.32

@@ -21,9 +21,6 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
-__all__ = ["ErrorEstimates", "default_tolerances", "with_standard_errors"]
-
-
 FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Factors of the spreads between specimens and tests that are tried."""
 MIN_PATH_COSINE = 0.999

@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Posterior"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Posterior(PosteriorPlots):

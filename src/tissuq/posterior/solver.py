@@ -19,8 +19,6 @@ from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates
 
-__all__ = ["METHODS", "Method", "Solver"]
-
 Method = Literal["auto", "exact", "nuts", "smc", "joint"]
 MAX_COMPONENTS_OF_VALUE = 1000
 """Components that represent the posterior at one value of the noise, where it is summed over several."""

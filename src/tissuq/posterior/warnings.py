@@ -24,8 +24,6 @@ from tissuq.parameters.priors import Uniform
 from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
-__all__ = ["warnings_about"]
-
 PRIOR_BOUND_REACHED = "the posterior is truncated by a prior bound"
 """Start of the warning about a posterior that a bound of a prior cuts off."""
 

@@ -26,22 +26,6 @@ from tissuq.parameters.checks import check_probability
 from tissuq.prediction.moments import variance_of_noise
 from tissuq.prediction.stress import Stress
 
-__all__ = [
-    "STRESS_TYPES",
-    "Band",
-    "Mixtures",
-    "asked_for",
-    "centre_and_ends",
-    "extrapolation_share",
-    "inside_band",
-    "predict_band",
-    "predict_bands",
-    "predictive_mixtures",
-    "speaks_of",
-    "stress_ratio",
-]
-
-
 STRESS_TYPES = ("engineering", "cauchy")
 """What stresses are predicted as."""
 MAX_PAIRS, MIN_COMPONENTS = 5_000_000, 200

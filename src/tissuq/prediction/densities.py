@@ -25,19 +25,6 @@ from tissuq.prediction.moments import (
     values_by_symbol,
 )
 
-__all__ = [
-    "MAX_VALUES_AT_ONCE",
-    "LeaveOneOut",
-    "draws_by_symbol",
-    "joint_log_likelihood",
-    "leave_one_out",
-    "left_out_log_density",
-    "pointwise_log_likelihood",
-    "replicate_data",
-    "stride",
-]
-
-
 MAX_VALUES_AT_ONCE, MAX_VALUES_CONDENSED = 40_000_000, 4_000_000
 """Values at most in an array over draws and measurements (320 MB), and where the measurements are condensed."""
 

@@ -20,30 +20,6 @@ from tissuq.mechanics.rays import Rays, scores, with_errors
 from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = [
-    "CorrelatedGroup",
-    "basis_of",
-    "borne",
-    "coefficients",
-    "conditioned",
-    "conditioned_jointly",
-    "correlated_groups",
-    "drawn_curves",
-    "drawn_stress",
-    "energy_terms",
-    "level_of_errors",
-    "mean_curve",
-    "mean_curve_and_slopes",
-    "mean_stress",
-    "stress_moments",
-    "stress_slopes",
-    "stresses_beyond",
-    "values_by_symbol",
-    "values_of",
-    "variance_of_noise",
-]
-
-
 MAX_LOCKED_PROBABILITY = 1e-6
 """Probability that the material locks before a stretch, below which a stress there is predicted."""
 STRETCH_STEP = 1e-5

@@ -13,8 +13,6 @@ from tissuq.experiments.curve import Curve
 from tissuq.inference.solution import Solution
 from tissuq.prediction.bands import asked_for, centre_and_ends, predictive_mixtures
 
-__all__ = ["Judged", "interval_score", "judged", "root_mean_square"]
-
 
 def interval_score(low: FloatArray, high: FloatArray, values: FloatArray, prob: float) -> FloatArray:
     """Return the width of central intervals, and 2 / (1 - prob) times by how far values lie outside; small is good.

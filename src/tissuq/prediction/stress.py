@@ -24,9 +24,6 @@ from tissuq.prediction.moments import (
     values_of,
 )
 
-__all__ = ["Stress"]
-
-
 MIN_DRAWS = 6000
 """Draws, at the least, that stand for a posterior beyond the range of its data."""
 

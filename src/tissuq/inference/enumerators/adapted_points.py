@@ -25,9 +25,6 @@ from tissuq.model.scales import MAX_SCORE, at_scores
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["IRRELEVANT_LOG_DROP", "AdaptedPoints"]
-
-
 POINTS_PER_PARAMETER = 256
 """Points of a round for each parameter, about: their number is a power of two."""
 EFFECTIVE_MULTIPLE = 20.0

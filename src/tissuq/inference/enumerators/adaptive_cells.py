@@ -36,9 +36,6 @@ from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["AdaptiveCells"]
-
-
 DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
 MANY_LINES = 2000

@@ -39,9 +39,6 @@ from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["AmplitudeLattice"]
-
-
 MAX_PRIOR_MASS_ERROR = 0.01
 """Error of the mass of an amplitude's prior, summed on every second point, up to which the lattice serves it."""
 TOUCHED_MASS = 1e-10

@@ -16,19 +16,6 @@ from tissuq.inference.linear import LinearPriors
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
-__all__ = [
-    "NEGLIGIBLE_SHARE",
-    "Points",
-    "PointsAtKnownNoise",
-    "Weighing",
-    "at_end",
-    "linear_at",
-    "log_prior_of_amplitude",
-    "log_prior_of_noise",
-    "noise_grid",
-]
-
-
 NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
 """Of the noise given the rest: values, and the reach of its logarithm around its mode, in standard deviations
 1 / sqrt(2 freedom); above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""

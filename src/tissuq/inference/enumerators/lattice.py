@@ -17,9 +17,6 @@ from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.linear import integrated
 from tissuq.model.discrepancy import Member, side_by_side
 
-__all__ = ["LOG_RATIO_STEP", "MAX_STRESS_RATIO", "Directions", "Lattice", "Reduced", "Rows"]
-
-
 LOG_RATIO_STEP = 0.4
 """Of log g. The posterior of an amplitude that r directions tell has an sd of about 1 / sqrt(2 r) in its logarithm."""
 MIN_STRESS_RATIO, MAX_STRESS_RATIO = 1e-3, 1e6

@@ -11,8 +11,6 @@ import numpy as np
 
 from tissuq.arrays import FloatArray
 
-__all__ = ["FINE", "ROUGH", "Accuracy", "Line", "first_places", "known_along", "peaks"]
-
 LogDensity = Callable[[FloatArray], FloatArray]
 
 FIRST_END, FIRST_PLACES = 4.0, 17

@@ -15,9 +15,6 @@ from blackjax.mcmc.random_walk import RWState
 from tissuq.arrays import FloatArray
 from tissuq.inference.coordinates import Box
 
-__all__ = ["Mutation", "Program", "compiled_program"]
-
-
 MAX_CORRELATION_WITH_START = 0.1
 """Correlation with the start of a mutation, in any direction, below which the particles count as moved.
 

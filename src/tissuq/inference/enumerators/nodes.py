@@ -15,9 +15,6 @@ from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["OUTER_STEP", "SETTINGS_AT_ONCE", "Node", "Reach", "Sums", "single_nodes"]
-
-
 UNLIKELY_PROBABILITY = 1e-3
 """Probability of an amplitude's prior below which a lattice may begin."""
 OUTER_STEP, BEGINNINGS = 2 * LOG_RATIO_STEP, 2

@@ -23,9 +23,6 @@ from tissuq.model.noise import NOISE_SD, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["NoiseGrid", "at_level", "at_noise", "shares_with_factors", "with_known_noise"]
-
-
 SYMBOL = NOISE_SD.symbol
 END_FACTOR = 2.0
 """By which the noise may lie beyond the resolution of the tests and the noise of a fit without tolerances."""

@@ -28,9 +28,6 @@ from tissuq.inference.coordinates import (
     log_density_on_line,
 )
 
-__all__ = ["NutsDraws", "NutsSettings", "sample_nuts"]
-
-
 MIN_ESS_PER_CHAIN = 100
 MAX_DIVERGENT_SHARE = 0.01
 MIN_BFMI = 0.3

@@ -14,9 +14,6 @@ from tissuq.inference.quasi_monte_carlo import log_normal
 from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["TINY", "Outer"]
-
-
 LOG_RATIO_SD = 3.0
 """Standard deviation of the log of a ratio of noise parameters, in the coordinate that proposes it."""
 TINY = 1e-300

@@ -16,9 +16,6 @@ from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, Proposal, adapted, 
 from tissuq.model.scales import MAX_SCORE
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["Guide", "relative_error", "weighted_nodes"]
-
-
 VALUES_PER_PARAMETER = 64
 """Values taken at first for each of the parameters, and once more."""
 SCOUT_MEMBERS = 6

@@ -14,8 +14,6 @@ from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import FINE
 
-__all__ = ["MAX_DIMENSION", "START_PROBABILITIES", "Lines", "Quadrature", "gauss_rule", "has_missed", "integrate"]
-
 LogFunction = Callable[[FloatArray], FloatArray]
 
 MAX_DIMENSION = 3

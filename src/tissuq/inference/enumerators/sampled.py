@@ -23,9 +23,6 @@ from tissuq.inference.solution import Diagnostics, Marginals, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["JointNuts", "Nuts", "TemperedSmc", "sample_by_nuts", "sample_joint"]
-
-
 MAX_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""
 PRIOR_POINTS = 512

@@ -22,9 +22,6 @@ from tissuq.inference.coordinates import Box
 from tissuq.inference.enumerators.mutation import Mutation, Program, compiled_program
 from tissuq.inference.quasi_monte_carlo import resampled_at_random
 
-__all__ = ["SmcDraws", "SmcSettings", "sample_smc"]
-
-
 MIN_ESS = 400
 MAX_LOG_EVIDENCE_ERROR = 0.3
 MAX_TEMPERATURES = 1000

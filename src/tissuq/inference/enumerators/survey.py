@@ -10,8 +10,6 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.parameters.priors import Prior
 
-__all__ = ["Survey", "Warp", "climb", "coordinates_of", "log_prior_density", "parameters_of", "survey", "warp_along"]
-
 LogDensity = Callable[[FloatArray], FloatArray]
 
 PROBES = 10

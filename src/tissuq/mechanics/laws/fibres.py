@@ -16,8 +16,6 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform, Uniform
 from tissuq.registry import variants
 
-__all__ = ["DispersedFibres", "ExponentialFibres", "FibreMaterial", "StandardFibres"]
-
 NAME = re.compile(r"(?P<law>[\w-]+?)(?P<one>:one)?(@(?P<degrees>\d+(\.\d+)?))?")
 
 

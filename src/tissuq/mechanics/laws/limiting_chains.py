@@ -10,8 +10,6 @@ from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform, Uniform
 
-__all__ = ["ArrudaBoyce", "ExtendedTube", "Gent", "GentGent", "VanDerWaals"]
-
 LIMIT = Parameter(
     "Jm", "value of I1 - 3 at which the material locks", "limit", (0.0, inf), False, LogUniform(1.001, 100.0)
 )

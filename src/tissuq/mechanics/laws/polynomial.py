@@ -11,8 +11,6 @@ from tissuq.errors import ModelError
 from tissuq.mechanics.material import Material
 from tissuq.parameters.parameter import Parameter
 
-__all__ = ["Biderman", "Isihara", "MooneyRivlin", "NeoHookean", "Rivlin", "Yeoh"]
-
 C10 = Parameter("C10", "half the initial shear modulus of the neo-Hookean term", support=(0.0, inf))
 C01 = Parameter("C01", "coefficient of I2 - 3")
 C20 = Parameter("C20", "coefficient of (I1 - 3)^2")

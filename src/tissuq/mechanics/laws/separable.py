@@ -14,8 +14,6 @@ from tissuq.mechanics.material import StretchMaterial
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 
-__all__ = ["Hencky", "Ogden", "Ogden1", "Ogden2", "Ogden3", "PengLandel", "ValanisLandel"]
-
 LARGEST_EXPONENT = 40.0
 """Reported for soft tissue: about 10 to 25 for skin and fat, about -20 for brain."""
 SMALLEST_EXPONENT = 0.5

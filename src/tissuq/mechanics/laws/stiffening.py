@@ -10,8 +10,6 @@ from tissuq.mechanics.material import Material
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform
 
-__all__ = ["Demiray", "Fung", "Knowles", "VerondaWestmann"]
-
 
 def _modulus(law: str) -> Parameter:
     return Parameter("mu", f"initial shear modulus of {law}", support=(0.0, inf))

@@ -15,21 +15,6 @@ from tissuq.mechanics.invariants import invariant_rates, invariants
 from tissuq.mechanics.rays import Range, dispersed
 from tissuq.model.discrepancy.processes import pinned_squared_exponential
 
-__all__ = [
-    "Coordinates",
-    "DirectionBlock",
-    "EnergyBlock",
-    "HenckyBlock",
-    "LogBlock",
-    "SecondInvariantBlock",
-    "SmallStrainBlock",
-    "SplineBlock",
-    "TaylorBlock",
-    "ValanisLandelBlock",
-    "ZeroModulusBlock",
-]
-
-
 MAX_EXPONENT = 200.0
 """Largest exponent of a kernel; it is reached only far beyond the data."""
 SIGN_SHARE = 0.1

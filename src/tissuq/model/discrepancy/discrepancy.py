@@ -15,8 +15,6 @@ from tissuq.experiments.modes import States
 from tissuq.mechanics.material import Material
 from tissuq.parameters.parameter import Parameter
 
-__all__ = ["Discrepancy", "NoDiscrepancy"]
-
 
 @dataclass(frozen=True)
 class Discrepancy(ABC):

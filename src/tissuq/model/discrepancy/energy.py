@@ -34,21 +34,6 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import HalfCauchy
 from tissuq.registry import find, variants
 
-__all__ = [
-    "Auto",
-    "AutoBalanced",
-    "AutoFirst",
-    "AutoIsotropic",
-    "AutoSharp",
-    "EnergyDiscrepancy",
-    "EnergySum",
-    "Member",
-    "discrepancies",
-    "discrepancy_named",
-    "side_by_side",
-]
-
-
 AMPLITUDES = tuple(
     Parameter(symbol, f"amplitude of the {index} energy", "modulus", (0.0, float("inf")), False, HalfCauchy(1.0))
     for symbol, index in (("c1", "first"), ("c2", "second"))

@@ -16,8 +16,6 @@ from tissuq.mechanics.stress import stress_basis
 from tissuq.model.discrepancy.discrepancy import Discrepancy
 from tissuq.parameters.parameter import Parameter
 
-__all__ = ["Constant", "IndependentError", "Linear", "MooneyRivlinTerm", "Quadratic", "YeohTerms"]
-
 S = Parameter.scale("S", "standard deviation of the discrepancy about its mean")
 M = tuple(Parameter(f"m{degree}", f"coefficient of stretch^{degree}") for degree in range(3))
 

@@ -22,17 +22,6 @@ from tissuq.model.discrepancy.discrepancy import Discrepancy
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 
-__all__ = [
-    "ConditionedProcess",
-    "GaussianProcess",
-    "OrthogonalProcess",
-    "PinnedProcess",
-    "RangeProcess",
-    "ScaledProcess",
-    "pinned_squared_exponential",
-    "squared_exponential",
-]
-
 MAX_SERIES_EXPONENT = 40.0
 """Product of scores beyond which the first terms of the exponential's series are less than rounding."""
 QUADRATURE_NODES = 96
