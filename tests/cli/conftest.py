@@ -130,7 +130,7 @@ def save_no_figure(figure: object, folder: Path, name: str) -> None:
 @pytest.fixture
 def empty_figures(monkeypatch):
     """Leave empty files in the place of figures."""
-    monkeypatch.setattr("tissuq.report.figures.save_figure", save_no_figure)
+    monkeypatch.setattr("tissuq.drawing.style.save_figure", save_no_figure)
 
 
 @pytest.fixture(scope="session")
@@ -138,7 +138,7 @@ def paper_run(tmp_path_factory):
     """A small run of the paper's study, on one range, with figures left empty: its folder and what was said."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tissuq.validation.paper.study.RANGES", ())
-        patch.setattr("tissuq.report.figures.save_figure", save_no_figure)
+        patch.setattr("tissuq.drawing.style.save_figure", save_no_figure)
         return carry_out_paper(tmp_path_factory.mktemp("paper"))
 
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.drawing.style import save_figure
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.answer import answer_on_new_figure
-from tissuq.report.figures import described_curves, marginal_figure, predictive_figure, save_figure
+from tissuq.report.figures import described_curves, marginal_figure, predictive_figure
 
 KPA = StressUnit("kPa", 1e-3)
 

@@ -123,7 +123,7 @@ def test_every_kind_of_content_is_written(tmp_path):
 def test_the_recipe_says_the_command_and_that_there_are_no_figures(tmp_path):
     write_result(result_of(), tmp_path, figures=False)
     recipe = (tmp_path / "run.toml").read_text()
-    assert f"of tissuq {version('tissuq')}: tissuq design --no-figures --option --config run.toml" in recipe
+    assert f"(version {version('tissuq')}): tissuq design --no-figures --option --config run.toml" in recipe
     assert "tissuq design --no-figures --option --config run.toml" in (tmp_path / "report.html").read_text()
     assert not (tmp_path / "figures").exists()
     assert "<img" not in (tmp_path / "report.html").read_text()

@@ -10,7 +10,6 @@ from tissuq.assessment.extent import has_energy
 from tissuq.drawing.panels import columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BASE, TRUTH, new_figure
-from tissuq.drawing.style import save_figure as save_figure
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import Described, described

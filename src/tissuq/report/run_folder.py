@@ -240,7 +240,7 @@ def versions() -> dict[str, str]:
 
 def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
     """Write every figure as SVG and PNG."""
-    from tissuq.report.figures import save_figure
+    from tissuq.drawing.style import save_figure
 
     (folder / "figures").mkdir(exist_ok=True)
     for name, figure in figures.items():
@@ -253,5 +253,5 @@ def write_recipe(folder: Path, command: str, settings: BaseModel, without: froze
 
     plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
     again = f"tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER"
-    header = f"# Repeat this run of tissuq {version('tissuq')}: {again}\n"
+    header = f"# Repeat this run (version {version('tissuq')}): {again}\n"
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")
