@@ -531,6 +531,14 @@ class Posterior(PosteriorPlots):
         ------
         ModelError
             When the noise depends on the data (``proportional``, ``repeats``).
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+        >>> drawn = tq.fit(data, discrepancy="none", noise_sd=0.02).prior_predictive(draws=200)
+        >>> dict(drawn["prior_predictive"]["stress"].sizes)
+        {'chain': 1, 'draw': 200, 'measurement': 4}
         """
         return tree_of(prior_arrays(self.model, draws, self.seed, self.unit()))
 
