@@ -149,7 +149,7 @@ def patient_band(
             f"no specimen was measured at {loading.controls[0].name} {points[~is_known.any(axis=0)][0]:g}, so that the "
             "model error there is unknown: predict nearer to the data, or with discrepancy=False."
         )
-    stresses = np.empty((chains * draws, len(points)))
+    stresses = np.full((chains * draws, len(points)), np.nan)
     patterns, pattern_of = np.unique(is_known, axis=1, return_inverse=True)
     for i, posterior in enumerate(posteriors):
         matching = matching_draws(posterior, coordinates, line_values[:, i])
