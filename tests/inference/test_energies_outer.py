@@ -10,7 +10,8 @@ from scipy.stats import halfcauchy
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.outer_search import Guide, relative_error, weighted_nodes
+from tissuq.inference.enumerators.nodes import Guide
+from tissuq.inference.enumerators.outer_search import relative_error, weighted_nodes
 from tissuq.inference.linear import times_gaussians
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points, log_normal
 from tissuq.model.noise import stress_level

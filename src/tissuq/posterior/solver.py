@@ -13,8 +13,8 @@ from tissuq.inference.enumerators.adapted_points import AdaptedPoints
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
+from tissuq.inference.enumerators.nodes import Guide
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
-from tissuq.inference.enumerators.outer_search import Guide
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates

@@ -26,9 +26,9 @@ from tissuq.inference.enumerators.amplitudes import (
     noise_grid,
 )
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Reduced
-from tissuq.inference.enumerators.nodes import OUTER_STEP, SETTINGS_AT_ONCE, Node, single_nodes
+from tissuq.inference.enumerators.nodes import OUTER_STEP, SETTINGS_AT_ONCE, Guide, Node, single_nodes
 from tissuq.inference.enumerators.outer import Outer
-from tissuq.inference.enumerators.outer_search import Guide, weighted_nodes
+from tissuq.inference.enumerators.outer_search import weighted_nodes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
@@ -115,7 +115,7 @@ class AmplitudeLattice:
                 few = bounded_points // OUTER_BOUNDED_DIVISOR
                 sums = (_EnergySums(model, *weighted_nodes(model, self.guide), few) for model in models)
                 return [energy_sums.solution(self.components, seed) for energy_sums in sums]
-            nodes = single_nodes(models, self.guide.reach)
+            nodes = single_nodes(models, self.guide)
             sums = (
                 _EnergySums(model, [node], np.zeros(1), 0.0, bounded_points)
                 for model, node in zip(models, nodes, strict=True)

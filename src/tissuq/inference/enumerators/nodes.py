@@ -10,8 +10,9 @@ import numpy as np
 from tissuq.arrays import FloatArray, IndexArray
 from tissuq.inference.enumerators.amplitudes import Points, PointsAtKnownNoise, Weighing, at_end, linear_at
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, MAX_STRESS_RATIO, Directions, Lattice, Rows
+from tissuq.inference.enumerators.line import FINE, Accuracy
 from tissuq.inference.enumerators.outer import Outer
-from tissuq.inference.quasi_monte_carlo import systematic
+from tissuq.inference.quasi_monte_carlo import Proposal, systematic
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -62,23 +63,30 @@ class Node:
 
 
 @dataclass
-class Reach:
-    """Whether the lattices of the last model went on beyond what suffices mostly: those of a similar one begin so."""
+class Guide:
+    """Where the posterior of amplitudes and outer parameters was last: what the search in a similar model begins with.
 
-    is_long: bool = False
+    A lower accuracy takes fewer values.
+    """
+
+    accuracy: Accuracy = FINE
+    places: FloatArray | None = None
+    peaks: FloatArray | None = None
+    proposal: Proposal | None = None
+    has_large_amplitudes: bool = False
 
 
-def single_nodes(models: Sequence[StatisticalModel], reach: Reach) -> list[Node]:
+def single_nodes(models: Sequence[StatisticalModel], guide: Guide) -> list[Node]:
     """Return the posteriors of models on the same stretches that have no outer parameters."""
     stresses = np.array([model.stress for model in models]).T
     rows = Rows(models[0].design[None], stresses[None], np.ones(len(stresses)), models[0].experiment.size)
     terms, members = _Terms(models), range(len(models[0].energy_members))
-    for largest in _largest_ratios(models)[-1 if reach.is_long else 0 :]:
+    for largest in _largest_ratios(models)[-1 if guide.has_large_amplitudes else 0 :]:
         lattices = [Lattice(terms.directions(member, rows.scale, largest=largest), rows) for member in members]
         sums = [Weighing(model, lattices, index).points() for index, model in enumerate(models)]
         if not any(at_end(lattices, points).any() for points, _ in sums):
             break
-        reach.is_long = True
+        guide.has_large_amplitudes = True
     nodes = []
     for index, (points, error) in enumerate(sums):
         points = _thinned(points, MAX_POINTS, 0.5)

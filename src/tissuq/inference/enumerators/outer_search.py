@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.line import FINE, Accuracy, first_places, known_along, peaks
-from tissuq.inference.enumerators.nodes import Node, Reach, Sums
+from tissuq.inference.enumerators.line import first_places, known_along, peaks
+from tissuq.inference.enumerators.nodes import Guide, Node, Sums
 from tissuq.inference.enumerators.outer import TINY, Outer
-from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, Proposal, adapted, effective
+from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, adapted, effective
 from tissuq.model.scales import MAX_SCORE
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -24,20 +24,6 @@ GUIDED_DIVISOR = 8
 """So many times fewer values in a round, where it is known from a similar model about where they lie."""
 NEGLIGIBLE_MEMBERS = 1e-3
 """Share of the posterior, in its middle, of all members that are left out."""
-
-
-@dataclass
-class Guide:
-    """Where the posterior of amplitudes and outer parameters was last: what the search in a similar model begins with.
-
-    A lower accuracy takes fewer values.
-    """
-
-    accuracy: Accuracy = FINE
-    places: FloatArray | None = None
-    peaks: FloatArray | None = None
-    proposal: Proposal | None = None
-    reach: Reach = field(default_factory=Reach)
 
 
 def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
