@@ -138,13 +138,14 @@ class Call(Generic[Kind, How]):
     @cached_property
     def settings(self) -> Kind:
         """The settings, those that were typed before those in a file."""
-        return self.loaded_as(self.kind)
+        return self.loaded()
+
+    def loaded(self, rivals: tuple[str, ...] = (), **changes: Any) -> Kind:
+        """Return the settings with changes to what was typed; of rivals only one can be set."""
+        return self.loaded_as(self.kind, rivals, **changes)
 
     def loaded_as(self, kind: type[Whole], rivals: tuple[str, ...] = (), **changes: Any) -> Whole:
-        """Return the settings with changes to what was typed; of rivals only one can be set.
-
-        ``kind`` may be another class, which adds what only a file can say.
-        """
+        """Return `loaded` settings of another class, which may add what only a file can say."""
         return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
 
     def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:

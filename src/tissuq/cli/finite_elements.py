@@ -152,7 +152,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
     for example, value in (("--replace NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):
         if call.config is None and not value:
             raise InputError(f"give {example}: what the model is asked for.")
-    settings = call.loaded_as(call.kind, model=model, materials=materials or None)
+    settings = call.loaded(model=model, materials=materials or None)
     call.check_named_again(settings, is_dry=call.how.dry_run)
     return settings
 

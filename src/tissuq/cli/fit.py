@@ -153,7 +153,7 @@ def population(call: Call[PopulationSettings, Written]) -> None:
     from tissuq.studies.population import run_population
 
     call.check_source("files", "the FILES of several specimens, folders of them", "run")
-    settings, material = call.loaded_as(call.kind, ("noise", "noise_sd")), call.stated.get("material")
+    settings, material = call.loaded(rivals=("noise", "noise_sd")), call.stated.get("material")
     law = material_named(material, laws=True) if material else None
     target = call.target(Path("runs") / "population")
     study = call.carried_out(
@@ -183,7 +183,7 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     call.check_source("files", "a FILE of controls and measured values", "run")
     if not (call.config or "priors" in call.stated or "prior_run" in call.stated):
         raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5), or --prior-run.")
-    settings = call.loaded_as(call.kind, ("forward", "umbridge"))
+    settings = call.loaded(rivals=("forward", "umbridge"))
     call.check_named_again(settings)
     target = call.target(Path("runs") / Path(settings.files[0]).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")

@@ -59,7 +59,7 @@ def design(call: Call[DesignSettings, OfRun]) -> None:
         return str(name) if is_from_here else seen_from(call.beside, name)
 
     typed = tuple(with_folder(name, beside_settings) for name in call.stated.get("targets", ()))
-    settings = call.loaded_as(call.kind, run=beside_settings(stated) if stated else None, targets=typed or None)
+    settings = call.loaded(run=beside_settings(stated) if stated else None, targets=typed or None)
     run = (call.beside / settings.run).resolve()
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=call.beside / settings.run)
 
