@@ -9,7 +9,7 @@ import pytest
 
 import tissuq as tq
 from loading import MEASURED
-from tissuq.experiments.modes import Equibiaxial, Planar, SimpleShearNormal, Uniaxial
+from tissuq.experiments.modes import Biaxial, Equibiaxial, Planar, SimpleShearNormal, Uniaxial
 from tissuq.mechanics import (
     Material,
     NeoHookean,
@@ -17,6 +17,7 @@ from tissuq.mechanics import (
     Ogden2,
     Ogden3,
     StretchMaterial,
+    material_named,
     stress_basis,
     traced_stress_basis,
 )
@@ -43,6 +44,27 @@ def test_several_settings_give_several_bases():
     assert bases.shape == (3, 15, 2)
     for basis, setting in zip(bases, settings, strict=True):
         np.testing.assert_allclose(stress_basis(Ogden2(), Uniaxial().at(STRETCH), setting), basis, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["ogden-2+gent+yeoh", "neo-hookean+ogden-4", "holzapfel-gasser-ogden"])
+def test_the_basis_of_a_sum_times_its_moduli_is_the_stress_of_its_energy(name):
+    material, generator = material_named(name), np.random.default_rng(4)
+    linear, path = material.linear_mask, Biaxial().paths[1]
+    values = generator.uniform(0.5, 1.2, (6, len(linear)))
+    values[:, [p.dimension == "limit" for p in material.parameters]] += 20.0
+    points = generator.uniform(0.8, 1.4, (11, 2))
+    expected = engineering_stress(material, path, points, values)
+    bases = stress_basis(material, path.at(points), values[:, ~linear])
+    np.testing.assert_allclose(np.einsum("mnk,mk->mn", bases, values[:, linear]), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_fibres_at_rest_need_no_compiler():
+    points = np.linspace([1.0, 1.0], [1.1, 1.05], 9)
+    states, value = Biaxial().paths[0].at(points), np.array([[2.0, 3.0, 0.7]])
+    found = complex_step_stress(material_named("exponential-fibres"), states, value)
+    I4 = points[:, 0] ** 2 * np.cos(0.7) ** 2 + points[:, 1] ** 2 * np.sin(0.7) ** 2
+    slope = 2 * 2.0 * (I4 - 1) * np.exp(3.0 * (I4 - 1) ** 2) * 2 * points[:, 0] * np.cos(0.7) ** 2
+    np.testing.assert_allclose(found[0], slope, rtol=1e-12)
 
 
 def test_a_material_without_nonlinear_parameters_needs_no_setting():

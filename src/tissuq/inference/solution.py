@@ -12,6 +12,7 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, widened
+from tissuq.inference.threads import one_thread
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -143,18 +144,23 @@ class Solution:
     @cached_property
     def mixture(self) -> GaussianMixture:
         """The posterior as a mixture; predictions rest on it."""
-        return self.represent()
+        with one_thread():
+            return self.represent()
 
     @cached_property
     def wide_mixture(self) -> GaussianMixture:
         """The same with components in the tails, too, where importance weights may need them."""
-        return self.mixture if self.represent_tails is None else self.represent_tails()
+        if self.represent_tails is None:
+            return self.mixture
+        with one_thread():
+            return self.represent_tails()
 
     def few_components(self, count: int, *, wide: bool) -> GaussianMixture:
         """Return at most so many components that stand for `mixture`, or for `wide_mixture`; neither is kept."""
-        if self.represent_few is not None:
-            return self.represent_few(count, wide)
-        return ((self.represent_tails if wide else None) or self.represent)().resampled(count)
+        with one_thread():
+            if self.represent_few is not None:
+                return self.represent_few(count, wide)
+            return ((self.represent_tails if wide else None) or self.represent)().resampled(count)
 
     @cached_property
     def draws(self) -> dict[str, FloatArray]:

@@ -65,6 +65,11 @@ class Material(ABC):
         values[:, :, ~is_linear] = nonlinear[:, None]
         return values
 
+    @property
+    def addends(self) -> tuple[tuple[Material, list[int]], ...]:
+        """Materials whose energies add up to this one, and which of its parameters each of them has."""
+        return ((self, [*range(len(self.parameters))]),)
+
     @abstractmethod
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         """Return the strain energy per undeformed volume (MPa) for parameter values in their order."""
@@ -214,6 +219,15 @@ class MaterialSum(Material):
         """Return every summand with its values."""
         ends = pairwise(accumulate((len(material.parameters) for material in self.summands), initial=0))
         return [(material, values[start:end]) for material, (start, end) in zip(self.summands, ends, strict=True)]
+
+    @property
+    def addends(self) -> tuple[tuple[Material, list[int]], ...]:
+        """Those of its summands."""
+        return tuple(
+            (addend, [places_of_summand[place] for place in places])
+            for summand, places_of_summand in self.shares(range(len(self.parameters)))
+            for addend, places in summand.addends
+        )
 
 
 def axes_felt_by(materials: Iterable[Material]) -> tuple[int, ...]:

@@ -19,8 +19,11 @@ from tissuq.mechanics.material import Material
 
 MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 """Number of stresses from which compiling their derivatives takes less time, and of those that are computed at once."""
-REAL_STEPS = (1e-5, 1e-6, 1e-7)
-"""Steps of the stretch for difference quotients: shorter ones where an energy bends more, and rounding matters less."""
+REAL_STEPS = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+"""Steps of the stretch for difference quotients: shorter ones where an energy bends more, and rounding matters less.
+
+The shortest is for fibres at rest, whose stiffness jumps where they begin to be stretched.
+"""
 CHECKED_PLACES = 5
 """Of many parameter values, at how many places some are taken, of which the difference quotient is formed."""
 AGREEMENT = 1e-5
@@ -138,11 +141,27 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     rows = np.atleast_2d(settings)
     _check_nonlinear(material, rows.shape[1:])
     _check_deformations(material, states)
+    if len(material.addends) > 1 and not has_free_axis(material, states):
+        bases = _bases_of_addends(material, states, rows)
+        return bases if settings.ndim == 2 else np.asarray(bases[0])
     curves = complex_step_stress(material, states, material.unit_values(rows).reshape(-1, len(material.parameters)))
     if curves is None:
         curves = _scattered(states, lambda path, points: _bases(material, path)(points, rows))
     bases = np.ascontiguousarray(curves.reshape(len(rows), -1, len(states)).swapaxes(1, 2))
     return bases if settings.ndim == 2 else np.asarray(bases[0])
+
+
+def _bases_of_addends(material: Material, states: States, rows: FloatArray) -> FloatArray:
+    """Return `stress_basis` (m, n, k) at values (m, s), the columns of each addend by themselves."""
+    is_linear = material.linear_mask
+    values = np.zeros((len(rows), is_linear.size))
+    values[:, ~is_linear] = rows
+    bases = np.zeros((len(rows), len(states), is_linear.size))
+    for addend, places in material.addends:
+        nonlinear = values[:, places][:, ~addend.linear_mask]
+        columns = np.array(places)[addend.linear_mask]
+        bases[:, :, columns] = stress_basis(addend, states, nonlinear if nonlinear.shape[1] else ())
+    return bases[:, :, is_linear]
 
 
 def stresses_by_basis(material: Material, states: States, values: FloatArray) -> FloatArray:

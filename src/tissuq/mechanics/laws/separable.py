@@ -10,7 +10,7 @@ from typing import Any
 
 from tissuq.errors import ModelError
 from tissuq.mechanics.arithmetic import log
-from tissuq.mechanics.material import StretchMaterial
+from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 
@@ -47,6 +47,12 @@ class _Ogden(StretchMaterial):
     """W = sum of 2 mu_i/alpha_i^2 (l1^alpha_i + l2^alpha_i + l3^alpha_i - 3)."""
 
     source = "Ogden 1972"
+
+    @property
+    def addends(self) -> tuple[tuple[Material, list[int]], ...]:
+        """Laws of one term each."""
+        count = len(self.parameters) // 2
+        return tuple((Ogden1(), [number, count + number]) for number in range(count))
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         l1, l2, l3 = stretches
