@@ -5,7 +5,7 @@ A base class whose variants other packages may add names a group of entry points
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from inspect import isabstract
@@ -49,18 +49,19 @@ def _origin(kind: type) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
 
 
-def find(base: type[T], kind: str, name: str, error: type[TissuqError]) -> type[T]:
-    """Return the variant of that name, or raise ``error`` that lists the names there are."""
+def find(base: type[T], kind: str, name: str, error: type[TissuqError], further_names: Iterable[str] = ()) -> type[T]:
+    """Return the variant of that name, or raise ``error`` that lists the names there are, and further ones."""
     classes = variants(base)
     if name in classes:
         return classes[name]
     for plugin in plugins(base, str(name)):
         return plugin
-    text = str(name).lower()
-    family = [full for full in classes if text and full.startswith(f"{text}-")]
-    close = family or get_close_matches(text, classes, n=1)
+    text, names = str(name).lower(), [*classes, *further_names]
+    family = [full for full in names if text and full.startswith(f"{text}-")]
+    abbreviated = [full for full in names if "".join(word[0] for word in full.split("-")) == text]
+    close = family or abbreviated or get_close_matches(text, names, n=1)
     hint = f" Did you mean {' or '.join(map(repr, close))}?" if close else ""
-    raise error(f"there is no {kind} named '{name}'.{hint} Choose one of: {', '.join(classes)}.")
+    raise error(f"there is no {kind} named '{name}'.{hint} Choose one of: {', '.join(names)}.")
 
 
 def plugins(base: type[T], name: str | None = None) -> list[type[T]]:

@@ -147,6 +147,8 @@ def test_unknown_noise_beside_a_free_independent_error_is_said_to_be_confounded(
         ({"seed": -1}, "whole number"),
         ({"material": "neohooke"}, "Did you mean 'neo-hookean'"),
         ({"material": "ogden"}, "Did you mean 'ogden-1' or 'ogden-2' or 'ogden-3'"),
+        ({"material": "HGO"}, "Did you mean 'holzapfel-gasser-ogden'"),
+        ({"material": "vw"}, "Did you mean 'veronda-westmann'"),
         ({"discrepancy": "gauss"}, "no discrepancy named 'gauss'"),
     ],
 )

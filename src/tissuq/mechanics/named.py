@@ -82,7 +82,7 @@ def _single(name: str, laws: bool) -> Material:
     if name not in variants(Material):
         for plugin in load_plugins(Material.entry_point_group, as_material, name):
             return plugin
-    return find(Material, "material", name, ModelError)()
+    return find(Material, "material", name, ModelError, SUMS)()
 
 
 def plugins() -> list[Material]:
