@@ -8,6 +8,7 @@ import json
 import numpy as np
 import pytest
 
+import tissuq as tq
 from tissuq.studies.calibration import _are_proportional, _stresses_of_specimens
 
 from .conftest import command, run_in, tree
@@ -96,6 +97,22 @@ def test_a_page_says_for_what_the_parameters_can_be_used_and_what_those_of_the_e
         "c [mN]": "sd of the discrepancy",
         "psi [mm]": "length of the discrepancy",
     }
+
+
+def test_the_text_for_a_paper_has_model_data_priors_emulator_and_result(calibrate_run):
+    folder, _ = calibrate_run
+    record = json.loads((folder / "run" / "result.json").read_text())
+    (text,) = next(section["text"] for section in record["sections"] if section["title"].startswith("Text for"))
+    for words in (
+        f"The model force.py:force was calibrated by Bayesian inference with tissuq {tq.__version__} to",
+        "is a Gaussian process with the covariance",
+        "('gp-pinned' of tissuq",
+        "Priors: mu ",
+        "was made from 16 runs",
+    ):
+        assert words in text
+    mu = next(number for number in record["numbers"] if number["name"] == "mu")
+    assert f"mu {mu['text']} (" in text
 
 
 def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):

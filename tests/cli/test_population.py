@@ -97,6 +97,11 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
     assert f"known to ± {100 * half_width:.0f} %" in reporting["reason"]
     assert predicting["purpose"] == "predict a new specimen"
     assert "WITH CARE  report the modulus of the tissue" in said.out
+    text = contents["result"]["sections"][-1]["text"][0]
+    assert "was fitted by Bayesian inference with tissuq" in text
+    assert "to 6 specimens (" in text
+    assert "The prior of every spread is half-normal" in text
+    assert f"initial shear modulus of a new specimen {headline['text']} (" in text
 
 
 @pytest.mark.slow

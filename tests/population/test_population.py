@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import partial, reduce
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.stats import norm, truncnorm
 import tissuq as tq
 from tissuq.assessment.uses import COMPUTING, Use, Verdict
 from tissuq.population import answer
-from tissuq.population.answer import use_of_law_alone
+from tissuq.population.answer import PopulationAnswer, use_of_law_alone
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
 from tissuq.report.population_in_words import next_step_of
@@ -482,32 +482,33 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     (warning,) = _far_specimens(population)
     assert warning.severity == Severity.PROBLEM
     assert "the initial modulus of soft is 0.0053 times that of the other specimens" in warning
-    assert next_step_of(population, []).startswith("look at soft first")
+    of = partial(PopulationAnswer, ())
+    assert next_step_of(population, [], of(())).startswith("look at soft first")
     without_unit = ResultWarning("the unit of the stress is not stated.", "doubtful-reading", Severity.PROBLEM)
-    assert next_step_of(population, [without_unit]).startswith("say what the files do not")
+    assert next_step_of(population, [without_unit], of(())).startswith("say what the files do not")
     population.posteriors.pop("soft")
-    assert "finite elements" in next_step_of(population, [], share=0.2)
-    assert next_step_of(population, [], share=0.3).startswith("fit another law (--material) before you compute")
+    assert "finite elements" in next_step_of(population, [], of((), share=0.2))
+    assert next_step_of(population, [], of((), share=0.3)).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
-    assert "--aim 20%" in next_step_of(population, [], uses=useless)
-    assert next_step_of(population, [], uses=useless, has_aim=True).startswith("find out what sets the specimens apart")
-    assert next_step_of(population, [], share=0.3, uses=useless, has_aim=True).startswith("fit another law")
+    assert "--aim 20%" in next_step_of(population, [], of(useless))
+    assert next_step_of(population, [], of(useless), has_aim=True).startswith("find out what sets the specimens apart")
+    assert next_step_of(population, [], of(useless, share=0.3), has_aim=True).startswith("fit another law")
     not_predicted = [Use(PREDICTING, Verdict.NO, NOT_PREDICTED)]
-    assert "finite elements" in next_step_of(population, [], uses=not_predicted)
+    assert "finite elements" in next_step_of(population, [], of(not_predicted))
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
-    assert next_step_of(population, [at_rest], uses=useless).startswith("take off what the load cell shows at rest")
-    said = next_step_of(population, [at_rest], already_without=["d"], uses=useless, at_rest=["a"])
+    assert next_step_of(population, [at_rest], of(useless)).startswith("take off what the load cell shows at rest")
+    said = next_step_of(population, [at_rest], of(useless), ["d"], at_rest=["a"])
     assert said.startswith("take off what the load cell shows at rest in a, as the warning about it says")
     assert said.endswith("or leave it out: --without d --without a")
     apart, departing = ([Use(PREDICTING, Verdict.NO, reason)] for reason in (CONTRADICTING, DEPARTING))
-    assert next_step_of(population, [], uses=apart).startswith("find out why the tests of a specimen contradict")
-    assert next_step_of(population, [], uses=departing).endswith("--discrepancy auto")
+    assert next_step_of(population, [], of(apart)).startswith("find out why the tests of a specimen contradict")
+    assert next_step_of(population, [], of(departing)).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = True
-    assert next_step_of(population, [], uses=useless).endswith("--discrepancy auto")
+    assert next_step_of(population, [], of(useless)).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = False
-    assert next_step_of(population, [], share=0.3, uses=useless).startswith("fit another law")
+    assert next_step_of(population, [], of(useless, share=0.3)).startswith("fit another law")
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
-    assert next_step_of(population, []).startswith("find out why the specimens differ so much")
+    assert next_step_of(population, [], of(())).startswith("find out why the specimens differ so much")
 
 
 def test_what_leaves_the_discrepancy_out_serves_where_that_carries_little():

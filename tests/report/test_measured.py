@@ -13,7 +13,7 @@ from tissuq.report.measured import specimens_section
     ("discrepancy", "noise_sd", "words"),
     [
         ("none", 1e-5, "the material is right. Noise: known standard deviation: 1e-05."),
-        ("gp", "unknown", "The discrepancy is c^2 exp(-(l - l')^2 / (2 psi^2)) ('gp' of tissuq"),
+        ("gp", "unknown", "is a Gaussian process with the covariance c^2 exp(-(l - l')^2 / (2 psi^2)) ('gp' of tissuq"),
     ],
 )
 def test_a_page_of_specimens_says_how_they_were_read_and_what_was_fitted(tmp_path, discrepancy, noise_sd, words):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import exp
 from typing import Any, NamedTuple
@@ -15,6 +15,7 @@ from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import COMPUTING, PRECISE, Use, Verdict
 from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.draws import PopulationDraws
 from tissuq.population.patient import patient_band
@@ -51,11 +52,14 @@ class PopulationAnswer:
         Reporting the modulus of the tissue, predicting a new specimen, and finite elements with one.
     law : str
         Where the law by itself does not describe the measurements: how much of the stress the discrepancy carries.
+    share : float
+        That share, the median of the specimens; zero where it is not known.
     """
 
     estimates: tuple[PopulationEstimate, ...]
     uses: tuple[Use, ...]
     law: str = ""
+    share: float = 0.0
 
     def __str__(self) -> str:
         lines = [
@@ -66,12 +70,28 @@ class PopulationAnswer:
         return "\n".join([*lines, *(f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses)])
 
 
-def answer_of_population(population: PopulationDraws, warnings: Sequence[str]) -> PopulationAnswer:
-    """Return the answer that a population with these warnings gives."""
+def answer_of_population(
+    population: PopulationDraws,
+    warnings: Sequence[str],
+    shown: StressUnit | None = None,
+    bands: Iterable[Band] | None = None,
+    at_rest: Sequence[str] = (),
+) -> PopulationAnswer:
+    """Return the answer that a population with these warnings gives.
+
+    Parameters
+    ----------
+    shown : StressUnit, optional
+        That of the estimates, unless it is that of the population.
+    bands : iterable of Band, optional
+        The stress of a new specimen where specimens were measured, where it is known already.
+    at_rest : sequence of str
+        The specimens with stress at rest, where it is known which.
+    """
     words, times = headline(population)
     symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
-    unit = population.unit_of(symbol, population.unit())
-    table = numbers_of(population.summary())
+    shown = shown or population.unit()
+    unit, table = population.unit_of(symbol, shown), numbers_of(population.summary(unit=shown.name))
 
     def estimate(name: str, quantity: str, unit_name: str) -> PopulationEstimate:
         middle, low, high = (table[symbol, quantity][end] for end in ("median", *ENDS))
@@ -80,14 +100,21 @@ def answer_of_population(population: PopulationDraws, warnings: Sequence[str]) -
         return PopulationEstimate(name, times * middle, times * low, times * high, unit_name)
 
     estimates = (
-        estimate(f"{words} of a new specimen", "new patient", unit.name),
+        estimate(f"{words} of a new specimen{patient_in_words(population)}", "new patient", unit.name),
         estimate(f"{words}, median of the population", "median", unit.name),
         estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
     )
-    share = share_of_discrepancy(population, warnings)
-    uses = uses_of_population(population, [*_bands(population)], warnings, "modulus" if words == MODULUS else words)
+    share = share_of_discrepancy(population, warnings, at_rest)
+    known = [*(_bands(population) if bands is None else bands)]
+    uses = uses_of_population(population, known, warnings, "modulus" if words == MODULUS else words, at_rest)
     law = about_law(population, share) + about_modulus(population, share, words)
-    return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip())
+    return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip(), share)
+
+
+def patient_in_words(population: PopulationDraws) -> str:
+    """Return what is known of the new specimen, in brackets; nothing without covariates."""
+    text = population.covariates.described(population.patient_covariates)
+    return f" ({text})" if text else ""
 
 
 def _bands(population: PopulationDraws) -> Iterator[Band]:

@@ -16,7 +16,15 @@ from tissuq.experiments.units import stress_unit
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.noise import NOISE_SD
 from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
-from tissuq.report.calibration_in_words import finding_of, names_of, next_step_of, uses_of_calibration
+from tissuq.report.calibration_in_words import (
+    SUM_OF_PARTS,
+    finding_of,
+    methods_of_calibration,
+    names_of,
+    next_step_of,
+    noises_in_words,
+    uses_of_calibration,
+)
 from tissuq.report.inputs import Copies
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.tables import Row, interval, known_number, rows_of, significant
@@ -94,7 +102,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
         ),
         tables=(_parameters(study),),
-        sections=_sections(study),
+        sections=(*_sections(study), methods_of_calibration(study, numbers)),
         warnings=tuple(study.warnings),
         files=files,
         recipe=settings.model_copy(update=relocated),
@@ -262,12 +270,10 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
     refined = ", then points in the posterior" if calibration.held_out else ""
     whose = "The logarithms of the outputs" if emulator.basis.is_log else "The outputs"
     logarithms = f"; taken by logarithm: {', '.join(emulator.logarithms)}" if emulator.logarithms else ""
-    noise = ", ".join(f"{sd} ({name})" if name else str(sd) for name, sd in settings.noises.items())
     evidence = "" if calibration.log_evidence is None else f" Log evidence {calibration.log_evidence:.2f}."
     sentences = (
         f"Read: {'; '.join(map(_read, study.data.values()))}.",
-        "measured = emulator(parameters) + discrepancy(control) + noise (Kennedy & O'Hagan 2001), all Gaussian given "
-        f"the parameters; noise sd {noise}.",
+        f"measured = {SUM_OF_PARTS}, all Gaussian given the parameters; noise sd {noises_in_words(settings)}.",
         f"{len(runs)} runs ({settings.design} design{refined}), {significant(float(np.median(runs.seconds)))} s each. "
         f"{whose} vary in {directions} direction{'s' * (directions != 1)}, each a process with the kernel "
         f"{settings.kernel} and a {settings.trend} mean{logarithms}. The variation outside these directions is part of "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import version
 from math import inf
 
 from tissuq.assessment.uses import MIN_INSIDE, Use, Verdict, precision_of, relative_half_width, worst_of
@@ -11,12 +12,16 @@ from tissuq.emulation.problem import is_far
 from tissuq.emulation.warnings import NO_PARAMETERS_FIT
 from tissuq.model.discrepancy import GaussianProcess, NoDiscrepancy, PinnedProcess
 from tissuq.prediction.bands import Band
+from tissuq.report.measured import METHODS, other_form
+from tissuq.report.result import Number, Section
 from tissuq.result_warning import Severity, has_code, symbols_in
 from tissuq.studies.calibration import CalibrationStudy
+from tissuq.studies.calibration_settings import CalibrationSettings
 
 LARGE_SHARE, TOO_LARGE_SHARE = 0.1, 0.5
 """Shares of the variance of a parameter that the emulator's error makes: beyond the first more runs are worth while,
 beyond the second an interval says more of the emulator than of the parameter."""
+SUM_OF_PARTS = "emulator(parameters) + discrepancy(control) + noise (Kennedy & O'Hagan 2001)"
 FEW_NAMES = 2
 """Parameters that a purpose names; more are called the parameters."""
 IF_RIGHT = "if the model is right: its errors are not included"
@@ -181,3 +186,28 @@ def next_step_of(study: CalibrationStudy, uses: Sequence[Use]) -> str:
         "name the law of the model and the stretches in it: repeat the command with --material LAW --range LOW:HIGH "
         "--force; predict, export and structure then take the run."
     )
+
+
+def methods_of_calibration(study: CalibrationStudy, numbers: Sequence[Number]) -> Section:
+    """Return the text for the methods section of a paper: data, model, emulator, priors, computation and result."""
+    calibration, settings, problem = study.calibration, study.settings, study.calibration.problem
+    kind, posterior = problem.discrepancy, calibration.posterior
+    priors = ", ".join(f"{study.label(symbol)} {prior}" for symbol, prior in problem.priors.items())
+    means = "; ".join(f"{number.name} {number.text} ({number.range})" for number in numbers)
+    sentences = (
+        f"The model {study.forward.name} was calibrated by Bayesian inference with tissuq {version('tissuq')} to "
+        f"{len(problem.measured)} measurements, taken as {SUM_OF_PARTS}.",
+        other_form(kind, kind.name) if kind.parameters else "No discrepancy was included: the model is right.",
+        f"Noise sd: {noises_in_words(settings)}. Priors: {priors}.",
+        f"The emulator, Gaussian processes of the model's outputs with the kernel {settings.kernel} and a "
+        f"{settings.trend} mean, was made from {len(calibration.runs)} runs; the variance of its error is part of the "
+        f"likelihood. Checks: {calibration.check}.",
+        f"Posterior by {posterior.method}, effective size {min(posterior.ess.values()):.0f}. {posterior.verdict}",
+        f"Posterior means, with 95 % highest-density intervals: {means}.",
+    )
+    return Section(METHODS, (" ".join(sentences),))
+
+
+def noises_in_words(settings: CalibrationSettings) -> str:
+    """Return the noise of every quantity."""
+    return ", ".join(f"{sd} ({name})" if name else str(sd) for name, sd in settings.noises.items())

@@ -13,6 +13,7 @@ from tissuq.report.summary import FOLLOWS, parameter_rows
 from tissuq.report.tables import interval
 
 if TYPE_CHECKING:
+    from tissuq.model.discrepancy import Discrepancy
     from tissuq.model.statistical_model import StatisticalModel
     from tissuq.model.tolerances import Tolerances
     from tissuq.posterior.posterior import Posterior
@@ -27,8 +28,9 @@ PRIORS = (
     "energies are half-Cauchy, with the typical C10 of the data as their scale; such a posterior may have no mean or "
     "sd, so none is given."
 )
+METHODS = "Text for the methods section of a paper"
 LAW = "The material model {0.name}, with the strain-energy density W = {0.formula} ({0.source}), was fitted"
-INTRODUCTION = "{law} by Bayesian inference with tissuq {version} to {count}: {tests}."
+INTRODUCTION = "{law} by Bayesian inference with tissuq {version} to {data}."
 INTERVALS = "Posterior means, with 95 % highest-density intervals of {meaning}: {numbers}."
 WHOLE_TESTS = "Errors of whole tests were included with these standard deviations: {sizes}."
 WITHOUT_LATERAL_STRESS = (
@@ -41,7 +43,6 @@ ENERGY = (
     "The discrepancy is the stress of a further free energy of the invariants without initial stiffness, before the "
     "data a Gaussian process of zero mean ('{name}' of tissuq), averaged over its forms by their evidence."
 )
-OTHER_FORM = "The discrepancy is {formula} ('{name}' of tissuq; {source})."
 
 
 def named(experiment: Experiment) -> str:
@@ -87,10 +88,14 @@ def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Secti
 def specimens_section(tests: Mapping[str, Sequence[Experiment]], model: StatisticalModel, noise_sd: object) -> Section:
     """Return how the files of specimens were read, and as what their stress was taken: of ``model``, one of them."""
     sources = tuple(f"**{name}**: {test.source}." for name, of_one in tests.items() for test in of_one)
-    noise = model.noise.description + f": {noise_sd}" * (not model.noise.parameters)
-    discrepancy = _discrepancy_in_words(model, model.discrepancy.name)
-    law = f"{LAW.format(model.material)} to every specimen. {discrepancy} Noise: {noise}."
+    discrepancy = discrepancy_in_words(model, model.discrepancy.name)
+    law = f"{LAW.format(model.material)} to every specimen. {discrepancy} {noise_of_specimens(model, noise_sd)}"
     return Section("The data and the model of every specimen", (sources, law))
+
+
+def noise_of_specimens(model: StatisticalModel, noise_sd: object) -> str:
+    """Return what the random errors of measurements of specimens are taken to be."""
+    return f"Noise: {model.noise.description}" + f": {noise_sd}" * (not model.noise.parameters) + "."
 
 
 def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:
@@ -141,11 +146,11 @@ def methods_section(study: SpecimenStudy) -> Section:
     """Return the text, of the discrepancy that answers: model, data, errors, priors, computation and result."""
     posterior, unit, tests = study.posteriors[study.main], study.unit, study.experiment.tests
     diagnostics = posterior.diagnostics
+    count = "a test" if len(tests) == 1 else f"{len(tests)} tests"
     introduction = INTRODUCTION.format(
         law=LAW.format(posterior.model.material),
         version=version("tissuq"),
-        count="a test" if len(tests) == 1 else f"{len(tests)} tests",
-        tests="; ".join(tests_in_words(study.experiment)),
+        data=f"{count}: {'; '.join(tests_in_words(study.experiment))}",
     )
     priors = ", ".join(
         f"{row['parameter']} {row['prior']}{' ' * bool(row['unit'])}{row['unit']}"
@@ -161,7 +166,7 @@ def methods_section(study: SpecimenStudy) -> Section:
         numbers.append(f"{name} {interval(mean, mean, sd)[0]} ({' to '.join(interval(low, high, sd))}) {unit.name}")
     sentences = (
         introduction,
-        _discrepancy_in_words(posterior.model, study.main),
+        discrepancy_in_words(posterior.model, study.main),
         f"Noise: {noise_in_words(study, posterior)}.",
         WHOLE_TESTS.format(sizes=sizes) if sizes else "",
         WITHOUT_LATERAL_STRESS.format(derived=derived) if derived else "",
@@ -170,13 +175,20 @@ def methods_section(study: SpecimenStudy) -> Section:
         "" if diagnostics is None else diagnostics.verdict,
         INTERVALS.format(meaning=posterior.model.meaning, numbers=", ".join(numbers)),
     )
-    return Section("Text for the methods section of a paper", (" ".join(filter(None, sentences)),))
+    return Section(METHODS, (" ".join(filter(None, sentences)),))
 
 
-def _discrepancy_in_words(model: StatisticalModel, name: str) -> str:
+def discrepancy_in_words(model: StatisticalModel, name: str) -> str:
+    """Return of what the measured stress is taken to be the sum."""
     discrepancy = model.discrepancy
     if not discrepancy.parameters:
         return NO_DISCREPANCY
     if model.energy_symbols:
         return DISCREPANCY + ENERGY.format(name=name)
-    return DISCREPANCY + OTHER_FORM.format(name=name, formula=discrepancy.formula, source=discrepancy.source)
+    return DISCREPANCY + other_form(discrepancy, name)
+
+
+def other_form(discrepancy: Discrepancy, name: str) -> str:
+    """Return what a discrepancy that is no energy is."""
+    verb = "is a Gaussian process with the covariance" if discrepancy.is_correlated else "is"
+    return f"The discrepancy {verb} {discrepancy.formula} ('{name}' of tissuq; {discrepancy.source})."

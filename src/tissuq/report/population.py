@@ -10,17 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.errors import TissuqError
-from tissuq.population.answer import (
-    MODULUS,
-    about_law,
-    about_modulus,
-    headline,
-    share_of_discrepancy,
-    use_of_law_alone,
-)
+from tissuq.population.answer import ENDS, PopulationAnswer, answer_of_population, headline, patient_in_words
 from tissuq.population.patient import check_one_control
 from tissuq.population.picture import numbers_of
-from tissuq.population.uses import uses_of_population
 from tissuq.population.warnings import far_specimens
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -33,11 +25,13 @@ from tissuq.report.population_figures import (
     specimens_figure,
 )
 from tissuq.report.population_in_words import (
+    FITTED_SEPARATELY,
+    between_specimens,
     effects_of_covariates,
+    methods_of_population,
     needed_of,
     needed_table_of,
     next_step_of,
-    patient_in_words,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import Row, interval, rows_of, significant, with_named_units
@@ -55,7 +49,6 @@ PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""
 COVARIATES = "covariates-of-specimens"
 """The name of the table of covariates in a run's folder."""
-ENDS = ("hdi_low", "hdi_high")
 NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of specimens."
 SPECIMENS = (
     "Every specimen by itself (grey) and within the population (blue): 95 % interval and median (tick). Bands: 95 % "
@@ -106,7 +99,6 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     population, unit, settings = study.population, study.unit, study.settings
     copies, relocated = _copies(study, beside)
     law = relocated["material"]
-    share = share_of_discrepancy(population, study.warnings, study.at_rest)
     several = len(study.modes) > 1
     files: dict[str, Any] = {DATA: with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary, "specimens": population.specimen_summary}
@@ -123,20 +115,16 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     modes = ", ".join(mode.name for mode in study.modes)
     columns = ("stretch", "median", "low", "high")
     predicted = [Band(*(of_mode[name].to_numpy(float) for name in columns)) for of_mode, _ in bands.values()]
-    words = headline(population)[0]
-    quantity = "modulus" if words == MODULUS else words
-    uses = uses_of_population(population, predicted, study.warnings, quantity, study.at_rest)
-    uses = (*uses, use_of_law_alone(share, uses[-1]))
+    answer = answer_of_population(population, study.warnings, unit, predicted, study.at_rest)
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
-        numbers=_numbers(study),
-        finding=_lead(study) + about_law(population, share) + about_modulus(population, share, words),
-        uses=uses,
+        numbers=tuple(Number(*estimate) for estimate in answer.estimates),
+        finding=" ".join(filter(None, (_lead(study, answer), answer.law))),
+        uses=answer.uses,
         next_step=next_step_of(
-            population, study.warnings, share, settings.without, uses, has_aim=needed is not None,
-            at_rest=study.at_rest,
+            population, study.warnings, answer, settings.without, has_aim=needed is not None, at_rest=study.at_rest
         ),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
@@ -147,7 +135,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
             *effects_of_covariates(study),
             *needed_table_of(study, needed),
         ),
-        sections=_sections(study, bands, not_predicted),
+        sections=_sections(study, answer, bands, not_predicted),
         warnings=tuple(study.warnings),
         files=files | copies | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update=relocated),
@@ -172,30 +160,11 @@ def _share(half_width: float) -> str:
     return f"{significant(100 * half_width, 2)} %"
 
 
-def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
-    """Return what to expect of a new specimen, and median and spread of the population: of its headline."""
-    words, is_log = headline(study.population)[0], bool(study.population.coordinates.is_log[0])
-    return (
-        _of_headline(study, "new patient", f"{words} of a new specimen{patient_in_words(study)}"),
-        _of_headline(study, "median", f"{words}, median of the population"),
-        _of_headline(study, "spread", f"spread between specimens{', as a factor' * is_log}"),
-    )
-
-
-def _of_headline(study: PopulationStudy, quantity: str, name: str = "") -> Number:
-    """Return a quantity of the headline, in the unit of the files; a spread of logarithms as a factor."""
-    population = study.population
-    symbol, (_, times) = population.symbols[0], headline(population)
-    numbers = numbers_of(population.summary(unit=study.unit.name))[symbol, quantity]
-    middle, low, high = (numbers[end] for end in ("median", *ENDS))
-    if quantity == "spread" and population.coordinates.is_log[0]:
-        return Number(name, exp(middle), exp(low), exp(high))
-    return Number(name, times * middle, times * low, times * high, _unit(study, symbol))
-
-
-def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predicted: list[str]) -> tuple[Section, ...]:
+def _sections(
+    study: PopulationStudy, answer: PopulationAnswer, bands: Mapping[Measured, Bands], not_predicted: list[str]
+) -> tuple[Section, ...]:
     """Return what a page folds: every parameter, new specimens, specimens, how to read it, how it was computed."""
-    population, diagnostics, settings = study.population, study.population.diagnostics, study.settings
+    population, diagnostics = study.population, study.population.diagnostics
     is_one = len(population.symbols) == 1
     specimens = Picture(
         "specimens", lambda: specimens_figure(population, study.unit),
@@ -218,26 +187,19 @@ def _sections(study: PopulationStudy, bands: Mapping[Measured, Bands], not_predi
     if pairs:
         table = Table(["parameters", "correlation between specimens", "95 % interval"], pairs)
         sections.append(Section("Correlations", (table,)))
-    logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
-    linear = [symbol for symbol in population.symbols if symbol not in logs]
-    gaussian = [f"The logarithm{'s' * (len(logs) > 1)} of {', '.join(logs)}"] * bool(logs)
-    gaussian += [f"{', '.join(linear)} {'itself' if len(linear) == 1 else 'themselves'}"] * bool(linear)
-    sizes = " (in units of the typical size, for parameters of either sign)" if linear else ""
     computed: tuple[str, ...] = (
-        "Every specimen was fitted separately, with its own discrepancy and noise and wide priors, which are then "
-        "divided out (Lunn et al. 2013).",
-        f"{' and '.join(gaussian)} {'is' if is_one else 'are'} Gaussian between specimens. The prior of every spread "
-        f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2)"
-        f"{'; of effects, normal with sd 1' * bool(population.covariates)}.",
+        FITTED_SEPARATELY,
+        between_specimens(study),
         f"The specimens are integrated in closed form. {diagnostics.verdict} Effective share of the draws after "
         f"importance correction: {100 * population.hierarchy.effective:.1f} %. {study.seconds:.0f} s.",
     )
     if tolerances := _tolerances(population):
         sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
         computed += (f"Errors of the specimens' own tests are included (of the first one: {sizes}).",)
-    data = specimens_section(study.tests, next(iter(population.posteriors.values())).model, settings.noise_sd)
+    data = specimens_section(study.tests, next(iter(population.posteriors.values())).model, study.settings.noise_sd)
     how_computed = Section("How it was computed", (computed,))
-    return (*sections, Section("How to read it", (HOW_TO_READ,)), how_computed, data)
+    methods = methods_of_population(study, answer)
+    return (*sections, Section("How to read it", (HOW_TO_READ,)), how_computed, data, methods)
 
 
 def _about_specimens(population: Population) -> str:
@@ -362,17 +324,20 @@ def _text(numbers: Mapping[str, float], prefix: str = "") -> tuple[str, str]:
     return interval(middle, largest, width)[0], "[{}, {}]".format(*interval(low, high, width))
 
 
-def _lead(study: PopulationStudy) -> str:
+def _lead(study: PopulationStudy, answer: PopulationAnswer) -> str:
     """Return the finding in two sentences."""
-    symbol, words = study.population.symbols[0], headline(study.population)[0]
+    symbol, (words, times) = study.population.symbols[0], headline(study.population)
     quantity = symbol if words == symbol else f"the {words}"
-    median, new, complete = (_of_headline(study, name) for name in ("median", "new patient", "complete pooling"))
+    new, median = (Number(*estimate) for estimate in answer.estimates[:2])
+    pooled = numbers_of(study.population.summary(unit=study.unit.name))[symbol, "complete pooling"]
+    middle, low, high = (times * pooled[end] for end in ("median", *ENDS))
+    complete = Number("complete pooling", middle, low, high)
     far = " ".join(
         f"{name} is {ratio:.2g} times as stiff as the others, which makes these intervals as wide as they are."
         for name, ratio in far_specimens(study.population).items()
     )
     return (
         f"The median of {quantity} in the population is {median.text}; for a specimen that has not been measured"
-        f"{patient_in_words(study)} it is {new.range} {new.unit} (95 %). Taking all measurements for those of one "
-        f"specimen would say {complete.range} {new.unit}, which is no range of specimens.{f' {far}' * bool(far)}"
+        f"{patient_in_words(study.population)} it is {new.range} {new.unit} (95 %). Taking all measurements for those "
+        f"of one specimen would say {complete.range} {new.unit}, which is no range of specimens.{f' {far}' * bool(far)}"
     )

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import version
 from math import isnan
 from typing import TYPE_CHECKING
 
-from tissuq.assessment.uses import PRECISE, Use, Verdict
+from tissuq.assessment.uses import PRECISE, Verdict
 from tissuq.population import Population
+from tissuq.population.answer import PopulationAnswer
 from tissuq.population.draws import ALL_COVARIATES
 from tissuq.population.sample_size import MAX_SPECIMENS
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import far_specimens
-from tissuq.report.result import Table
+from tissuq.report.measured import (
+    INTRODUCTION,
+    LAW,
+    METHODS,
+    WHOLE_TESTS,
+    discrepancy_in_words,
+    errors_in_words,
+    noise_of_specimens,
+)
+from tissuq.report.result import Number, Section, Table
 from tissuq.report.tables import interval, percent
 from tissuq.result_warning import has_code
 from tissuq.studies.population import PopulationStudy
@@ -20,6 +31,10 @@ from tissuq.studies.population import PopulationStudy
 if TYPE_CHECKING:
     import pandas as pd
 
+FITTED_SEPARATELY = (
+    "Every specimen was fitted separately, with its own discrepancy and noise and wide priors, which are then divided "
+    "out (Lunn et al. 2013)."
+)
 WIDE_SPREAD = 1.0
 """Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
 
@@ -27,16 +42,15 @@ WIDE_SPREAD = 1.0
 def next_step_of(
     population: Population,
     warnings: Sequence[str],
-    share: float = 0.0,
+    answer: PopulationAnswer,
     already_without: Sequence[str] = (),
-    uses: Sequence[Use] = (),
     *,
     has_aim: bool = False,
     at_rest: Sequence[str] = (),
 ) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
 
-    ``share`` is that of the stress which the discrepancy carries; with an aim, the page has the number that it takes.
+    With an aim, the page has the number that it takes.
     ``at_rest`` are the specimens with stress at rest, where it is known which.
     """
     if not population.converged:
@@ -59,7 +73,7 @@ def next_step_of(
         return "take off what the load cell shows at rest, as the warning about it says, and fit again"
     if population.complete.model.discrepancy.is_best_fit:
         return "let the data decide how wrong the material is: fit again with --discrepancy auto"
-    reasons = {use.reason for use in uses}
+    reasons = {use.reason for use in answer.uses}
     if CONTRADICTING in reasons:
         return "find out why the tests of a specimen contradict each other: tissuq fit of one says which, and how much"
     if DEPARTING in reasons:
@@ -72,12 +86,12 @@ def next_step_of(
             "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
             "compute with a new one"
         )
-    if share > PRECISE:
+    if answer.share > PRECISE:
         return (
             "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
             "out; tissuq fit FILE --material all of one specimen says which"
         )
-    against = [use.reason for use in uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
+    against = [use.reason for use in answer.uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
     if any(reason != NOT_PREDICTED for reason in against):
         if has_aim:
             return (
@@ -88,6 +102,45 @@ def next_step_of(
             "sets them apart (--covariates)"
         )
     return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
+
+
+def between_specimens(study: PopulationStudy) -> str:
+    """Return how parameters are distributed between specimens, and under which priors."""
+    population = study.population
+    logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
+    linear = [symbol for symbol in population.symbols if symbol not in logs]
+    gaussian = [f"The logarithm{'s' * (len(logs) > 1)} of {', '.join(logs)}"] * bool(logs)
+    gaussian += [f"{', '.join(linear)} {'itself' if len(linear) == 1 else 'themselves'}"] * bool(linear)
+    sizes = " (in units of the typical size, for parameters of either sign)" if linear else ""
+    return (
+        f"{' and '.join(gaussian)} {'is' if len(population.symbols) == 1 else 'are'} Gaussian between specimens. The "
+        f"prior of every spread is half-normal with sd {study.settings.spread:.3g}{sizes}; of the mean, wide; of "
+        f"correlations, LKJ(2){'; of effects, normal with sd 1' * bool(population.covariates)}."
+    )
+
+
+def methods_of_population(study: PopulationStudy, answer: PopulationAnswer) -> Section:
+    """Return the text for the methods section of a paper: specimens, model, hierarchy, computation and result."""
+    population, unit = study.population, study.unit
+    posteriors, measurements = population.posteriors, sum(len(t) for tests in study.tests.values() for t in tests)
+    model = next(iter(posteriors.values())).model
+    of_specimens = f"{len(posteriors)} specimens ({', '.join(mode.name for mode in study.modes)} tests, {measurements}"
+    numbers = (Number(*estimate) for estimate in answer.estimates)
+    medians = "; ".join(f"{number.name} {number.text} ({number.range})" for number in numbers)
+    sizes = errors_in_words(model.tolerances, unit)
+    sentences = (
+        INTRODUCTION.format(
+            law=LAW.format(model.material), version=version("tissuq"), data=of_specimens + " measurements)"
+        ),
+        discrepancy_in_words(model, study.settings.discrepancy),
+        noise_of_specimens(model, study.settings.noise_sd),
+        WHOLE_TESTS.format(sizes=sizes) if sizes else "",
+        FITTED_SEPARATELY,
+        between_specimens(study),
+        population.diagnostics.verdict,
+        f"Posterior medians, with 95 % highest-density intervals: {medians}.",
+    )
+    return Section(METHODS, (" ".join(filter(None, sentences)),))
 
 
 HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % interval", "positive"]
@@ -120,12 +173,6 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
             "the share that all covariates explain.",
         ),
     )  # fmt: skip
-
-
-def patient_in_words(study: PopulationStudy) -> str:
-    """Return what is known of the new specimen, in brackets; nothing without covariates."""
-    text = study.population.covariates.described(study.population.patient_covariates)
-    return f" ({text})" if text else ""
 
 
 def needed_of(study: PopulationStudy) -> pd.DataFrame | None:
