@@ -123,10 +123,12 @@ def _sets(mesh: Any) -> Iterator[tuple[str, IndexArray]]:
     for name, members in mesh.point_sets.items():
         yield name, np.asarray(members, dtype=np.intp)
     numbers = mesh.cell_data.get("gmsh:physical", ())
-    groups = {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    groups: dict[str, Any] = {}
     for name, (number, dimensions) in mesh.field_data.items():
         blocks = zip(mesh.cells, numbers, strict=False)
         groups[name] = [np.flatnonzero((of_block == number) & (block.dim == dimensions)) for block, of_block in blocks]
+    # Later than those numbers, of which a cell has one: in version 4.1 of Gmsh's format it may be of several groups.
+    groups |= {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
     for name, rows in groups.items():
         blocks = zip(mesh.cells, rows, strict=False)
         of_blocks = [block.data[np.asarray(row, dtype=np.intp)].ravel() for block, row in blocks if row is not None]
