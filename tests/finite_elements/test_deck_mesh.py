@@ -62,6 +62,15 @@ def test_nodes_and_elements_may_stand_in_several_blocks_and_files_with_comments(
     assert _set(mesh, "REST") == sorted(NODES[5:])
 
 
+@pytest.mark.parametrize(("kind", "nodes"), [("T3D2", "1, 4"), ("B32", "1, 4, 2"), ("CPS4", "1, 4, 8, 5")])
+def test_edges_and_faces_name_their_nodes_as_decks_of_gmsh_have_them(tmp_path, kind, nodes):
+    text = f"{BLOCK}*ELEMENT, type={kind}, ELSET=Line1\n30, {nodes}\n{CELLS}*ELSET, ELSET=left\n30,\n"
+    mesh = _read(tmp_path, text)
+    assert len(mesh.cells) == 2
+    for name in ("left", "Line1"):
+        assert _set(mesh, name) == sorted(NODES[int(word) - 1] for word in nodes.split(","))
+
+
 def _part(name, size):
     nodes = "".join(f"{n}, {size * x}, {y}, {z}\n" for n, (x, y, z) in enumerate(NODES, 1))
     return f"*Part, name={name}\n*Node\n{nodes}{CELLS}*Nset, nset=End\n9, 10, 11, 12\n*End Part\n"

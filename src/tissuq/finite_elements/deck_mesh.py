@@ -19,14 +19,18 @@ IN_A_FILE = re.compile(
 """A keyword whose data, or with ``*INCLUDE`` a part of the deck, stand in another file."""
 GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 """Keywords that make or place points and cells by rules that are not followed here."""
-ELEMENT = re.compile(r"(?:(?P<solid>C3D)|CAX|CPE|CPS|M3D|SFM3D|R3D|S)(?P<nodes>\d+)")
-LINES = re.compile("[BT][23]|MASS|SPRING|CONN|ROTARY|DASHPOT|DCOUP")
-"""Elements that are no cells of a body."""
-SOLIDS = {
-    4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20",
-}  # fmt: skip
-SURFACES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
-"""What meshio calls cells of so many nodes."""
+ELEMENT = re.compile(
+    r"C3D(?P<solid>\d+)|(?:CAX|CPE|CPS|M3D|SFM3D|R3D|S)(?P<surface>\d+)|T[23]D(?P<truss>[23])|B[23](?P<beam>[12])"
+)
+"""Types of elements, with the numbers of their nodes; of beams, with one less."""
+KINDS = {
+    "solid": {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"},
+    "surface": {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"},
+    "line": {2: "line", 3: "line3"},
+}
+"""What meshio calls elements of so many nodes."""
+WITHOUT_CELLS = ("MASS", "SPRING", "CONN", "ROTARY", "DASHPOT", "DCOUP")
+"""Beginnings of the types of elements that are no cells and no faces or edges of any."""
 Key: TypeAlias = tuple[str, int]
 """A node or an element: the part or instance of which it is, nothing in a deck without parts, and its number."""
 Members: TypeAlias = dict[tuple[str, str], list[Key]]
@@ -170,11 +174,9 @@ class _Deck:
 
     def _take_elements(self, given: Mapping[str, str], data: Sequence[Sequence[str]]) -> None:
         kind = _joined(given["TYPE"])
-        form = ELEMENT.match(kind)
-        if not form and LINES.match(kind):
+        if kind.startswith(WITHOUT_CELLS):
             return
-        count = int(form["nodes"]) if form else 0
-        meant = (SOLIDS if form and form["solid"] else SURFACES).get(count)
+        count, meant = _form(kind)
         if not meant:
             raise InputError(
                 f"'{self.path}' cannot be read as a mesh: its elements '{kind}' are not known. Write it again with the "
@@ -236,6 +238,16 @@ class _Deck:
     def _here(self, keys: Sequence[Key]) -> list[Key]:
         """Return the nodes or elements of these numbers in the instance."""
         return [(self.scope, number) for _, number in keys]
+
+
+def _form(kind: str) -> tuple[int, str]:
+    """Return the number of nodes of elements of a type, and what meshio calls them: nothing for unknown ones."""
+    match = ELEMENT.match(kind)
+    form = match.lastgroup if match else None
+    if not match or not form:
+        return 0, ""
+    count = int(match[form]) + (form == "beam")
+    return count, KINDS["line" if form in ("truss", "beam") else form].get(count, "")
 
 
 def _turned(points: FloatArray, turn: FloatArray) -> FloatArray:
