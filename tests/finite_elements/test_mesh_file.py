@@ -409,3 +409,16 @@ def test_few_full_runs_under_pressure_are_refused(posterior, tmp_path):
     )  # fmt: skip
     with pytest.raises(InputError, match="compute all draws in full"):
         simulate(posterior, case, draws=6, steps=1, full_runs=4)
+
+
+@pytest.mark.parametrize(("factor", "shift"), [(1.1, 0.0), (1.0, 0.5), (1000.0, 0.0)])
+def test_a_finer_mesh_of_another_body_is_refused(posterior, tmp_path, factor, shift):
+    bodies = []
+    for name, points, scale in (("coarse", 3, 1.0), ("fine", 5, factor)):
+        square = fem.Rectangle(b=(WIDTH, HEIGHT), n=points)
+        places = np.pad(scale * square.points + (shift if name == "fine" else 0.0), ((0, 0), (0, 1)))
+        meshio.Mesh(places, [("quad", square.cells)]).write(tmp_path / f"{name}.vtu")
+        file = str(tmp_path / f"{name}.vtu")
+        bodies.append(BodyFromFile(file, {"ymin": "xy"}, move="ymax", distance=0.1, shape="axisymmetric"))
+    with pytest.raises(InputError, match=r"the finer mesh is of another body: it reaches from .* to 2, 3, 0"):
+        simulate(posterior, bodies[0], 2, steps=1, finer=bodies[1])
