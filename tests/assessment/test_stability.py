@@ -59,6 +59,38 @@ def test_stability_is_lost_from_the_reference_outward():
     assert table["stable"].iloc[-1] == 0
 
 
+@pytest.fixture(scope="module")
+def lost_and_found_again():
+    """A posterior of Yeoh materials, most of which soften near a stretch of 1.6 and stiffen again beyond."""
+    stretch = np.linspace(1.02, 2.4, 40)
+    data = tq.simulate("yeoh", {"C10": 0.5, "C20": -0.15, "C30": 0.03}, stretch, noise_sd=0.05, seed=1)
+    return tq.fit(data, material="yeoh", discrepancy="none", noise_sd=0.05)
+
+
+@pytest.mark.parametrize("stretch", [[2.4], [1.2, 2.4], [2.4, 1.2]])
+def test_stability_that_is_lost_on_the_way_is_lost_whatever_stretches_are_asked_for(lost_and_found_again, stretch):
+    """By the closed form of the stress; at single stretches it was said to be stable with a probability of one."""
+    draws = lost_and_found_again.data["posterior"]
+    C10, C20, C30 = (draws[name].to_numpy().ravel()[:, None] for name in ("C10", "C20", "C30"))
+    way = np.linspace(1, 2.4, 2001)
+    x = way**2 + 2 / way - 3
+    stress = 2 * (way - way**-2) * (C10 + 2 * C20 * x + 3 * C30 * x**2)
+    share = (np.diff(stress) > 0).all(axis=1).mean()
+    table = lost_and_found_again.stability("uniaxial", stretch).set_index("stretch")
+    assert 0.3 < share < 0.5
+    assert table.loc[2.4, "stable"] == pytest.approx(share, abs=0.07)  # three standard errors of 500 draws
+    assert table.loc[2.4, "rising"] > 0.95
+    if 1.2 in stretch:
+        assert table.loc[1.2, "stable"] > 0.95
+
+
+def test_a_test_beyond_what_is_unstable_is_ranked_as_unstable(lost_and_found_again):
+    table = lost_and_found_again.design(["uniaxial 1.01:2.4 10", "uniaxial 1.01:1.3 10"])
+    ranked = table[~table["is_repeat"]].set_index("high")["stable"]
+    assert ranked[2.4] < 0.6
+    assert ranked[1.3] > 0.95
+
+
 def test_a_material_with_a_negative_modulus_is_said_not_to_be_stable():
     """Mooney-Rivlin on Treloar's uniaxial data, where 2 (C10 + C01) comes out below zero."""
     data = tq.datasets.load("rubber-treloar-uniaxial")

@@ -244,6 +244,23 @@ def test_a_cell_of_two_physical_groups_bears_its_force_once(tmp_path):
     assert set(read_mesh(tmp_path / "disc.msh").sets) >= {"inner", "body"}
 
 
+@pytest.mark.parametrize("groups", [("3 4", "1 2"), ("4 3", "2 1")])
+def test_an_edge_of_two_physical_groups_is_of_both(tmp_path, groups):
+    """Version 4.1: the edge at x = 0 and the cell beside it are of two groups, in whatever order they stand."""
+    entities = f"1 0 0 0 0 1 0 2 {groups[0]} 0\n2 2 0 0 2 1 0 1 4 0\n1 0 0 0 1 1 0 2 {groups[1]} 0\n2 1 0 0 2 1 0 1 2 0"
+    names = '1 3 "left"\n1 4 "ends"\n2 1 "half"\n2 2 "body"'
+    nodes = "\n".join(f"{x} {y} 0" for y in (0, 1) for x in (0, 1, 2))
+    cells = "1 1 1 1\n1 1 4\n1 2 1 1\n2 3 6\n2 1 3 1\n3 1 2 5 4\n2 2 3 1\n4 2 3 6 5"
+    text = f"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n4\n{names}\n$EndPhysicalNames\n"
+    text += f"$Entities\n0 2 2 0\n{entities}\n$EndEntities\n"
+    text += f"$Nodes\n1 6 1 6\n2 1 0 6\n1\n2\n3\n4\n5\n6\n{nodes}\n$EndNodes\n"
+    text += f"$Elements\n4 4 1 4\n{cells}\n$EndElements\n"
+    (tmp_path / "strip.msh").write_text(text, encoding="utf-8")
+    sets = read_mesh(tmp_path / "strip.msh").sets
+    wanted = {"left": [0, 3], "ends": [0, 2, 3, 5], "half": [0, 1, 3, 4], "body": [0, 1, 2, 3, 4, 5]}
+    assert {name: sets[name].tolist() for name in wanted} == wanted
+
+
 def test_parts_that_only_touch_and_parts_that_are_free_are_refused(tmp_path):
     cube = fem.Cube(n=3)
     hold = {"xmin": "x", "ymin": "y", "zmin": "z"}
@@ -392,3 +409,16 @@ def test_few_full_runs_under_pressure_are_refused(posterior, tmp_path):
     )  # fmt: skip
     with pytest.raises(InputError, match="compute all draws in full"):
         simulate(posterior, case, draws=6, steps=1, full_runs=4)
+
+
+@pytest.mark.parametrize(("factor", "shift"), [(1.1, 0.0), (1.0, 0.5), (1000.0, 0.0)])
+def test_a_finer_mesh_of_another_body_is_refused(posterior, tmp_path, factor, shift):
+    bodies = []
+    for name, points, scale in (("coarse", 3, 1.0), ("fine", 5, factor)):
+        square = fem.Rectangle(b=(WIDTH, HEIGHT), n=points)
+        places = np.pad(scale * square.points + (shift if name == "fine" else 0.0), ((0, 0), (0, 1)))
+        meshio.Mesh(places, [("quad", square.cells)]).write(tmp_path / f"{name}.vtu")
+        file = str(tmp_path / f"{name}.vtu")
+        bodies.append(BodyFromFile(file, {"ymin": "xy"}, move="ymax", distance=0.1, shape="axisymmetric"))
+    with pytest.raises(InputError, match=r"the finer mesh is of another body: it reaches from .* to 2, 3, 0"):
+        simulate(posterior, bodies[0], 2, steps=1, finer=bodies[1])

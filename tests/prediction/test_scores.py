@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 import tissuq as tq
 from tissuq.prediction.scores import interval_score, judged
+from tissuq.studies.predict_run import predicted
 
 NOISE_SD, TRUE = 0.02, 0.5
 STRETCH, OTHER = np.linspace(0.8, 1.4, 12), np.array([1.0, 1.1, 1.2, 1.3, 1.4])
@@ -85,3 +86,23 @@ def test_an_error_of_the_stress_is_not_judged_in_another_mode(fitted, unseen):
     with pytest.raises(tq.InputError, match="says nothing about the planar one"):
         judged(posterior.solution, unseen.curves[0])
     assert judged(posterior.solution, unseen.curves[0], discrepancy=False).summary()["error"] < 0.3
+
+
+@pytest.mark.parametrize("rows", [6_000, 400])
+def test_means_are_predicted_where_means_were_fitted(rows):
+    """The 95 % band of a fit of means of 10 held 73 % of single measurements (1.96 over the root of 10 sds: 46 %)."""
+
+    def measured(count, seed):
+        return tq.simulate("neo-hookean", {"C10": 0.4}, np.linspace(1.01, 1.4, count), noise_sd=0.1, seed=seed)
+
+    posterior = tq.fit(measured(20_000, 1), discrepancy="none", noise="independent")
+    assert posterior.model.experiment.rows_name == "means of 10 measurements"
+    (judged_rows,) = (judged(posterior.solution, curve) for curve in measured(rows, 2).curves)
+    assert len(judged_rows.measured) == rows // 10
+    assert judged_rows.is_inside.mean() >= 0.95
+    few = measured(12, 3)  # too far apart for means
+    with_few = predicted(posterior, data=few)
+    assert any("single ones scatter more, so that too many" in text for text in with_few.warnings)
+    assert any(text.endswith("single ones scatter more.") for text in predicted(posterior, stretch=[1.2]).warnings)
+    again = predicted(posterior, data=measured(20_000, 1))
+    assert any("was fitted to these measurements" in text for text in again.warnings)

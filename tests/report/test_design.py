@@ -129,3 +129,13 @@ def test_the_figure_has_a_panel_for_each_target_with_the_best_on_top(study):
     assert any("again" in label for label in labels)
     assert "kPa" in axes[0].get_xlabel()
     assert "kPa" not in axes[1].get_xlabel()
+
+
+def test_points_that_are_means_as_those_of_the_fit_are_said_to_be(study):
+    stretch = np.linspace(1.01, 1.4, 6000)
+    data = tq.simulate("neo-hookean", {"C10": 0.4}, stretch, noise_sd=0.1, seed=1)
+    of_means = replace(study, posterior=tq.fit(data, discrepancy="none", noise="independent"))
+    assert any(
+        "its points, as those of the fit, are means of 3 measurements." in each for each in of_means.explanations
+    )
+    assert not any("means of" in each for each in study.explanations)

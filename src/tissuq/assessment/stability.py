@@ -55,7 +55,8 @@ class Stability:
     rising : (g,) array
         The engineering stress rises with the stretch.
     stable : (g,) array
-        All three hold everywhere from the reference to this stretch.
+        All three hold everywhere from the reference to this stretch: at as many stretches on the way as `StableRange`
+        looks at, too.
     """
 
     mode: str
@@ -119,9 +120,10 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     """
     components = _sampled_components(solution)
     curves, is_isotropic = _curves(solution.model, components), are_isotropic(solution.model, components)
-    criteria = _criteria(curves, mode, stretch, is_isotropic)
-    stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(criteria))
-    shares = (flags.mean(axis=0) for flags in (*criteria, stable))
+    way = np.unique(np.concatenate([stretch, *_ways(mode, float(stretch.min()), float(stretch.max()))]))
+    criteria = _criteria(curves, mode, way, is_isotropic)
+    stable = _from_reference(way - mode.reference, np.logical_and.reduce(criteria))
+    shares = (flags.mean(axis=0)[np.searchsorted(way, stretch)] for flags in (*criteria, stable))
     return Stability(mode.name, stretch, *shares)
 
 
@@ -240,7 +242,13 @@ def _measured(data: Experiment, mode: LoadingMode, reach: float = 1.0) -> FloatA
     if reach > 1:
         states = MeasuredStates.of(data.states).times(reach)
         ends = farthest_stretch(mode, states, -1), farthest_stretch(mode, states, 1)
-    return np.unique(np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE) for end in ends]))
+    return np.unique(np.concatenate(_ways(mode, *ends)))
+
+
+def _ways(mode: LoadingMode, low: float, high: float) -> list[FloatArray]:
+    """Return stretches from the reference of a mode to the lowest and to the highest one on either side of it."""
+    reference = float(mode.reference)
+    return [np.linspace(reference, end, POINTS_PER_SIDE) for end in (min(low, reference), max(high, reference))]
 
 
 def _sampled_components(solution: Solution) -> GaussianMixture:

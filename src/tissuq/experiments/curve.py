@@ -104,13 +104,17 @@ class Curve:
         return self.mode.stresses[self.channel]
 
     def of_means(self, rows: int) -> Curve:
-        """Return the curve as so many rows, about: means of consecutive measurements, or of neighbours along it.
+        """Return the curve as so many rows, about: `in_means_of` some measurements."""
+        return self.in_means_of(self.averaged * -(-len(self) // max(rows, MIN_ROWS)))
+
+    def in_means_of(self, measurements: int) -> Curve:
+        """Return means of so many consecutive measurements, or of neighbours along the curve.
 
         Neighbours where consecutive measurements lie far apart, as repeated or shuffled ones do. Where these have
         several controls, and neighbours in one of them differ in others, all measurements are left.
         """
-        count = -(-len(self) // max(rows, MIN_ROWS))
-        if count == 1:
+        count = measurements // self.averaged
+        if count <= 1:
             return self
         controls = self.points.reshape(len(self), -1)
         order = np.arange(len(self))

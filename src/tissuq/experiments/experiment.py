@@ -361,10 +361,20 @@ class Experiment:
             return self
         return self._of_curves(curve.of_means(size // len(self.curves)) for curve in self.curves)
 
+    def in_means_as(self, experiment: Experiment) -> Experiment:
+        """Return means of as many measurements as the rows of another experiment are, where these are means."""
+        most = experiment.averaged_at_most
+        return self if most == 1 else self._of_curves(curve.in_means_of(most) for curve in self.curves)
+
+    @property
+    def averaged_at_most(self) -> int:
+        """How many measurements its rows are means of at the most; 1 where they are single ones."""
+        return max(curve.averaged for curve in self.curves)
+
     @property
     def rows_name(self) -> str:
         """What its rows are, in words: measurements, or means of some."""
-        most = max(curve.averaged for curve in self.curves)
+        most = self.averaged_at_most
         several = "up to " * (len({curve.averaged for curve in self.curves}) > 1)
         return f"means of {several}{most} measurements" if most > 1 else "measurements"
 

@@ -17,7 +17,8 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import AXIAL, Case, Inflation, Mesh, RigidTip, Supports
-from tissuq.finite_elements.mesh_file import AXES, NEARLY, MeshFile, deck_text, read_mesh
+from tissuq.finite_elements.deck_mesh import deck_text
+from tissuq.finite_elements.mesh_file import AXES, NEARLY, MeshFile, read_mesh
 
 Shape = Literal["axisymmetric", "plane", "solid"]
 

@@ -1,8 +1,7 @@
-"""The mesh in a file that meshio reads: points, cells of one kind and sets of points."""
+"""The mesh in a deck or a file that meshio reads: points, cells of one kind and sets of points."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -14,13 +13,9 @@ import numpy as np
 from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import InputError
 from tissuq.finite_elements.case import CELL_KINDS
+from tissuq.finite_elements.deck_mesh import mesh_of_deck
 
 AXES = "xyz"
-INCLUDE = re.compile(r"^\*INCLUDE\s*,\s*INPUT\s*=\s*(?P<file>[^\n]+)$", re.IGNORECASE | re.MULTILINE)
-ELEMENT_TYPE = re.compile(r"(^\*element\b[^\n]*\btype\s*=\s*)(\w+)", re.IGNORECASE | re.MULTILINE)
-"""The type of elements, which programs know in any case."""
-PLANE_ELEMENT = re.compile(r"(TYPE\s*=\s*)(?:CAX|CPE|CPS)([468])\w*", re.IGNORECASE)
-AS_MESHIO_KNOWS_IT = {"4": "CPS4", "6": "CPE6", "8": "S8R"}
 NEARLY = 1e-6
 """Distance from the end of a body within which a point is at it, over the size of the body."""
 
@@ -36,8 +31,8 @@ class MeshFile(NamedTuple):
 def read_mesh(path: Path) -> MeshFile:
     """Return the mesh in a file, with the sets in it and those at its ends, ``xmin`` to ``zmax``.
 
-    Sets are those of points (``*NSET``), and the points of named groups of cells (physical groups of Gmsh, ``*ELSET``).
-    A cell that stands there several times counts once.
+    Sets are those of points, and the points of named groups of cells (physical groups of Gmsh). A cell that stands
+    there several times counts once.
 
     Raises
     ------
@@ -52,7 +47,9 @@ def read_mesh(path: Path) -> MeshFile:
     try:
         with redirect_stdout(said), redirect_stderr(said):
             is_deck = path.suffix.lower() == ".inp"
-            mesh = meshio.read(StringIO(deck_text(path)), "abaqus") if is_deck else meshio.read(path)
+            mesh = mesh_of_deck(path) if is_deck else meshio.read(path)
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"the mesh '{path}' cannot be read: {error.strerror or error}.") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever a damaged file leads to, or exit
@@ -65,23 +62,11 @@ def _why_unreadable(path: Path, error: BaseException) -> str:
     again, reason = "Write it again with the program that made it", str(error)
     if "deduce file format" in reason:
         return f"no format of meshes is known by the name '{path.suffix}'. {again}, as .msh, .inp or .vtu."
-    if "Element type not available" in reason:
-        return f"its elements '{reason.rpartition(' ')[2]}' are not known. {again}, with elements such as C3D8."
     if isinstance(error, KeyError) and isinstance(error.args[0], int | np.integer):
         return f"its elements or sets have the node {error.args[0]}, which it lacks. {again}, with all nodes."
     if isinstance(error, ValueError) and "include each other" in reason:
         return "its files include each other. Take out one *INCLUDE."
     return f"it is damaged, cut short, or no {path.suffix} file. {again}."
-
-
-def deck_text(path: Path, depth: int = 0) -> str:
-    """Return a deck with its included files, and names of plane elements that meshio knows."""
-    if depth > 10:
-        raise ValueError("files include each other")
-    text = path.read_text(encoding="utf-8", errors="replace").replace("\r\n", "\n")
-    text = INCLUDE.sub(lambda match: deck_text(path.parent / match["file"].strip(), depth + 1).rstrip("\n"), text)
-    text = ELEMENT_TYPE.sub(lambda match: match[1] + match[2].upper(), text)
-    return PLANE_ELEMENT.sub(lambda match: match[1] + AS_MESHIO_KNOWS_IT[match[2]], text)
 
 
 def _used(path: Path, mesh: Any) -> MeshFile:
@@ -138,10 +123,12 @@ def _sets(mesh: Any) -> Iterator[tuple[str, IndexArray]]:
     for name, members in mesh.point_sets.items():
         yield name, np.asarray(members, dtype=np.intp)
     numbers = mesh.cell_data.get("gmsh:physical", ())
-    groups = {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    groups: dict[str, Any] = {}
     for name, (number, dimensions) in mesh.field_data.items():
         blocks = zip(mesh.cells, numbers, strict=False)
         groups[name] = [np.flatnonzero((of_block == number) & (block.dim == dimensions)) for block, of_block in blocks]
+    # Later than those numbers, of which a cell has one: in version 4.1 of Gmsh's format it may be of several groups.
+    groups |= {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
     for name, rows in groups.items():
         blocks = zip(mesh.cells, rows, strict=False)
         of_blocks = [block.data[np.asarray(row, dtype=np.intp)].ravel() for block, row in blocks if row is not None]

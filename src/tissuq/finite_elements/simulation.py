@@ -34,6 +34,8 @@ FAMILIES = {
 """The families in words, by their names."""
 TWICE = 2.0
 """How many times smaller the cells of the finer mesh of a case are."""
+SAME_BODY = 0.02
+"""Distance of the ends of a body on two meshes, over its size, from which they are those of two bodies."""
 MIN_DRAWS = 2
 """Smallest number of draws that must reach the first step."""
 
@@ -272,6 +274,14 @@ def _ratio(mesh: Mesh, finer: Mesh) -> float:
         raise InputError(
             f"the finer mesh has {counts[1]} {finer.kind.plural}, and the mesh {counts[0]} {mesh.kind.plural}: give "
             "smaller cells of the same kind."
+        )
+    places = [body.vectors(body.points) for body in (mesh, finer)]
+    ends, finer_ends = (np.array([xyz.min(axis=0), xyz.max(axis=0)]) for xyz in places)
+    if not np.allclose(ends, finer_ends, rtol=0, atol=SAME_BODY * float(np.ptp(ends, axis=0).max())):
+        corners = [", ".join(f"{value:.4g}" for value in corner) for corner in (*finer_ends, *ends)]
+        raise InputError(
+            f"the finer mesh is of another body: it reaches from {corners[0]} to {corners[1]} (x, y, z, mm), and the "
+            f"mesh from {corners[2]} to {corners[3]}. Give the same body, in the same place, with smaller cells."
         )
     return float((counts[1] / counts[0]) ** (1 / dimensions))
 

@@ -344,7 +344,8 @@ class Posterior(PosteriorPlots):
         discrepancy : bool
             With the discrepancy's share (eq. 27), or the model alone (eq. 28).
         noise : bool
-            For a new measurement, or for the stress itself.
+            For a new measurement, or for the stress itself. Where means of several measurements were fitted (more than
+            2000 rows), for a new one of them.
         prob : float
             Probability between low and high, equal tails.
         mode : str or LoadingMode, optional
@@ -384,7 +385,8 @@ class Posterior(PosteriorPlots):
         Parameters
         ----------
         test : Experiment
-            Its measurements without stress are left out: at rest it is zero by definition.
+            Its measurements without stress are left out: at rest it is zero by definition. Where means of several
+            measurements were fitted (more than 2000 rows), those of as many are judged.
         discrepancy, prob, stress_type, unit
             As of `predict`.
 

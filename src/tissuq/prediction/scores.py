@@ -85,13 +85,15 @@ class Judged:
 def judged(solution: Solution, curve: Curve, *, discrepancy: bool = True, prob: float = 0.95) -> Judged:
     """Return the measurements of a curve beside the predictions of a new test with noise.
 
-    Measurements without stress are left out: at rest it is zero by definition.
+    Measurements without stress are left out: at rest it is zero by definition. Where the posterior is of means of
+    several measurements, means of as many are predicted.
 
     Raises
     ------
     InputError, ModelError
         When the posterior cannot predict the test's mode, or nothing is left.
     """
+    curve = curve.in_means_of(solution.model.experiment.averaged_at_most)
     points, measured = curve.points[curve.stress != 0], curve.stress[curve.stress != 0]
     if not len(measured):
         raise InputError(f"experiment '{curve.name}' has no stress other than zero, and nothing to compare with.")

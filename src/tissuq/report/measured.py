@@ -106,8 +106,7 @@ def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str
     values = [test.noise_sd for test in settings.tests if test.noise_sd is not None]
     sizes = ", ".join(f"{value:g}" for value in values) or f"{settings.noise_sd:g}"
     of_means = " of single measurements, of means that over the root of their number"
-    is_averaged = any(curve.averaged > 1 for curve in study.experiment.curves)
-    return f"sd {sizes} {study.experiment.stress_unit}{of_means * is_averaged}"
+    return f"sd {sizes} {study.experiment.stress_unit}{of_means * (study.experiment.averaged_at_most > 1)}"
 
 
 def errors_in_words(tolerances: Tolerances, unit: StressUnit) -> str:

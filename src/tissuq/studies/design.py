@@ -73,11 +73,13 @@ class DesignStudy:
             if self.specimen == "other"
             else "the same specimen, without additional test errors; for another specimen use --next-specimen other"
         )
+        rows = self.posterior.model.experiment
+        points = f", and its points, as those of the fit, are {rows.rows_name}"
         return [
             "Expected sd: square root of the expected posterior variance, averaged over the possible outcomes of the "
             "test. The error given is that of the simulation: a test is as good as the best where their difference is "
             "less than two standard errors of it, or than 1 % of the sd now.",
-            f"The next test is on {whose}. Its noise is that of the data.",
+            f"The next test is on {whose}. Its noise is that of the data{points * (rows.averaged_at_most > 1)}.",
             "The expectations are only as good as the fitted model: material, discrepancy and noise.",
         ]
 

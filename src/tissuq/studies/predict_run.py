@@ -78,6 +78,7 @@ def predicted(
     data: Experiment | None = None,
 ) -> Prediction:
     """Return what a posterior predicts in a loading mode; the arguments are the options of `predict_run`."""
+    data = data and data.in_means_as(posterior.model.experiment)
     target = _mode(posterior, mode, data)
     grid = _points(posterior, target, stretch, points, data)
     model = posterior.model
@@ -238,6 +239,12 @@ def _prediction_warnings(
             due = ", and I1 and I2 are no larger beyond it than in the tests of the run"
         calibrated = f"{_calibrated_in_words(posterior, mode)}{due if largest else ''}"
         texts.append(f"{outside} lie outside the measured range: {calibrated}.")
+    if model.experiment.averaged_at_most > 1:
+        is_of_single = data is not None and data.averaged_at_most == 1
+        texts.append(
+            f"the bands of measurements are those of {model.experiment.rows_name}, as were fitted: single ones scatter "
+            f"more{', so that too many of those that are compared with them lie outside' if is_of_single else ''}."
+        )
     if data is not None and not was_fitted and model.tolerances.estimand in (AS_TESTED, SPECIMEN):
         texts.append(
             f"the bands of this run are of {model.meaning}: they do not cover another specimen. To include "
