@@ -8,7 +8,6 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -17,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, MeshSize, lines_of
+from tissuq.decks.deck import DeckFormat, DeckMaterial, MeshSize
 from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Values, unknown_set
 from tissuq.errors import InputError
+from tissuq.finite_elements.deck_keywords import Keyword, joined, keywords_of
 
 ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
 """Options of a material that a card replaces."""
@@ -46,54 +46,9 @@ USERS = {
 """Keywords that ask for what happens in a set, which another one makes."""
 
 
-@dataclass(frozen=True)
-class Keyword:
-    """A keyword line, its continuations included, and the end of the data below it (bytes)."""
-
-    name: str
-    parameters: dict[str, str]
-    start: int
-    end: int
-    data: tuple[str, ...]
-
-
-def keywords_of(content: bytes) -> Iterator[Keyword]:
-    """Return the keywords of a file; comments and blank lines below the data of one belong to none."""
-    heads: list[list[Line]] = []
-    bodies: list[list[Line]] = []
-    is_continued = False
-    for line in lines_of(content):
-        text = line.text.strip()
-        if text.startswith("**"):
-            continue
-        if is_continued:
-            heads[-1].append(line)
-        elif text.startswith("*"):
-            heads.append([line])
-            bodies.append([])
-        elif text and bodies:
-            bodies[-1].append(line)
-            continue
-        else:
-            continue
-        is_continued = text.endswith(",")
-    for head, body in zip(heads, bodies, strict=True):
-        name, *words = ",".join(line.text.strip().rstrip(",") for line in head).lstrip("*").split(",")
-        pairs = (word.partition("=") for word in words)
-        parameters = {_joined(key): value.strip().strip('"') for key, _, value in pairs if key.strip()}
-        end = body[-1].end if body else head[-1].end
-        data = tuple(line.text.strip() for line in body)
-        yield Keyword(_joined(name), parameters, head[0].start, end, data)
-
-
 def _keywords_in(files: Sequence[bytes]) -> Iterator[Keyword]:
     """Return the keywords of several files, one after the other."""
     return chain.from_iterable(map(keywords_of, files))
-
-
-def _joined(word: str) -> str:
-    """Return a keyword as the programs compare it: without blanks, in capitals."""
-    return re.sub(r"\s", "", word).upper()
 
 
 class AbaqusDeck(DeckFormat):
@@ -180,7 +135,7 @@ class AbaqusDeck(DeckFormat):
         for keyword in _keywords_in(files):
             if keyword.name == "ELGEN":
                 return None
-            kind = ELEMENT.match(_joined(keyword.parameters.get("TYPE", ""))) if keyword.name == "ELEMENT" else None
+            kind = ELEMENT.match(joined(keyword.parameters.get("TYPE", ""))) if keyword.name == "ELEMENT" else None
             if kind is not None:
                 dimensions, row = 3 if kind["solid"] else 2, 1 + int(kind["nodes"])
                 numbers = sum(bool(word.strip()) for line in keyword.data for word in line.split(","))
@@ -189,7 +144,7 @@ class AbaqusDeck(DeckFormat):
 
     def is_axisymmetric(self, files: Sequence[bytes]) -> bool:
         elements = (keyword for keyword in _keywords_in(files) if keyword.name == "ELEMENT")
-        return any(_joined(keyword.parameters.get("TYPE", "")).startswith("CAX") for keyword in elements)
+        return any(joined(keyword.parameters.get("TYPE", "")).startswith("CAX") for keyword in elements)
 
 
 def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:

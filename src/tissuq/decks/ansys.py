@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.arrays import FloatArray
-from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, decoded, lines_of
+from tissuq.decks.deck import DeckFormat, DeckMaterial
 from tissuq.decks.result_file import AS_TENSOR, ResultFile, Values
 from tissuq.errors import InputError
+from tissuq.finite_elements.deck_keywords import Line, decoded, lines_of
 
 ELASTIC_TABLES = {"HYPE", "ELAS", "ANEL", "AHYP"}
 """Tables (TB) that a card replaces, by the four letters that the program reads."""

@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import unified_diff
 from hashlib import sha256
@@ -14,39 +14,13 @@ from pathlib import Path, PurePosixPath
 from typing import ClassVar, NamedTuple
 
 from tissuq.errors import InputError
+from tissuq.finite_elements.deck_keywords import encoded, lines_of
 from tissuq.registry import find, variants
 
 CONTEXT = 3
 """Lines around a difference that are shown."""
 HUNK = re.compile(r"( [-+])(\d+)")
 """The number of a line where a difference starts."""
-
-
-def decoded(content: bytes) -> str:
-    """Return the text of a part of a deck; bytes that are no UTF-8 are kept for `encoded`."""
-    return content.decode("utf-8", "surrogateescape")
-
-
-def encoded(text: str) -> bytes:
-    """Return the bytes of a text of `decoded`."""
-    return text.encode("utf-8", "surrogateescape")
-
-
-@dataclass(frozen=True)
-class Line:
-    """A line of a file: where it starts and ends (bytes, its end of line included), and its text without that."""
-
-    start: int
-    end: int
-    text: str
-
-
-def lines_of(content: bytes) -> Iterator[Line]:
-    """Return the lines of a file."""
-    start = 0
-    for line in content.splitlines(keepends=True):
-        yield Line(start, start + len(line), decoded(line).rstrip("\r\n"))
-        start += len(line)
 
 
 MORE_THAN_ELASTIC = (

@@ -7,8 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from xml.parsers.expat import ExpatError, ParserCreate
 
-from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, MeshSize, decoded
+from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, MeshSize
 from tissuq.errors import InputError
+from tissuq.finite_elements.deck_keywords import decoded
 
 TYPE = re.compile(r"""(\stype\s*=\s*)("[^"]*"|'[^']*')""")
 DENSITY = re.compile(r"<density\b[^>]*>[^<]*</density>")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
-from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.decks.deck import MORE_THAN_ELASTIC, DeckFormat, DeckMaterial
+from tissuq.finite_elements.deck_keywords import Line, lines_of
 
 NOT_ELASTIC = ("*MAT_ADD", "*MAT_THERMAL", "*MAT_NONLOCAL")
 """Keywords that belong to another one, or to the temperature."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
+from tissuq.finite_elements.deck_keywords import Keyword, encoded, joined, keywords_of
 
 IN_A_FILE = re.compile(
     r"^(?P<keyword>\*(?:INCLUDE|NODE|ELEMENT|NSET|ELSET)\b(?:\s*,[^\n]*?)?)\s*,\s*INPUT\s*=\s*(?P<file>[^,\n]+)(?P<rest>[^\n]*)$",
@@ -37,14 +38,6 @@ Members: TypeAlias = dict[tuple[str, str], list[Key]]
 """Sets by the part or instance of which they are, and their names in capitals."""
 
 
-class Keyword(NamedTuple):
-    """A keyword, its parameters by names in capitals, and the words of every line of data below it."""
-
-    name: str
-    parameters: Mapping[str, str]
-    data: list[list[str]]
-
-
 def deck_text(path: Path, depth: int = 0) -> str:
     """Return a deck with the files that it includes."""
     if depth > 10:
@@ -53,7 +46,7 @@ def deck_text(path: Path, depth: int = 0) -> str:
 
     def inserted(match: re.Match[str]) -> str:
         keyword, file = match["keyword"], path.parent / match["file"].strip().strip('"')
-        head = "" if _joined(keyword) == "*INCLUDE" else f"{keyword}{match['rest']}\n"
+        head = "" if joined(keyword) == "*INCLUDE" else f"{keyword}{match['rest']}\n"
         return head + deck_text(file, depth + 1).rstrip("\n")
 
     return IN_A_FILE.sub(inserted, text)
@@ -73,7 +66,7 @@ def mesh_of_deck(path: Path) -> Any:
     import meshio
 
     deck = _Deck(path)
-    for keyword in keywords_of(deck_text(path)):
+    for keyword in keywords_of(encoded(deck_text(path))):
         deck.take(keyword)
     scopes = deck.scopes
     numbers = {key: number for number, key in enumerate(key for key in deck.points if key[0] in scopes)}
@@ -95,28 +88,6 @@ def mesh_of_deck(path: Path) -> Any:
         [(kind, np.array(rows)) for kind, rows in cells.items()],
         point_sets={name: np.unique(np.array(members, dtype=np.intp)) for name, members in sets.items()},
     )
-
-
-def keywords_of(text: str) -> Iterator[Keyword]:
-    """Yield the keywords of a deck with their data; comments are left out, wherever they stand."""
-    lines = (line.strip() for line in text.splitlines())
-    heads, bodies, is_continued = list[str](), list[list[list[str]]](), False
-    for line in lines:
-        if not line or line.startswith("**"):
-            continue
-        if is_continued:
-            heads[-1] += line
-        elif line.startswith("*"):
-            heads.append(line)
-            bodies.append([])
-        elif bodies:
-            bodies[-1].append([word.strip().strip('"') for word in line.rstrip(",").split(",")])
-            continue
-        is_continued = line.endswith(",")
-    for head, body in zip(heads, bodies, strict=True):
-        name, *words = head.lstrip("*").split(",")
-        pairs = (word.partition("=") for word in words)
-        yield Keyword(_joined(name), {_joined(key): value.strip().strip('"') for key, _, value in pairs}, body)
 
 
 class _Deck:
@@ -141,7 +112,8 @@ class _Deck:
 
     def take(self, keyword: Keyword) -> None:
         """Take what a keyword says of the mesh."""
-        name, given, data = keyword
+        name, given = keyword.name, keyword.parameters
+        data = [[word.strip().strip('"') for word in row.rstrip(",").split(",")] for row in keyword.data]
         if name in GENERATING or (name == "NODE" and given.get("SYSTEM", "R").upper() != "R"):
             which = "*NODE with SYSTEM=" + given["SYSTEM"] if name == "NODE" else f"*{name}"
             raise InputError(
@@ -173,7 +145,7 @@ class _Deck:
         self._add(self.node_sets, self.scope, given.get("NSET", ""), keys)
 
     def _take_elements(self, given: Mapping[str, str], data: Sequence[Sequence[str]]) -> None:
-        kind = _joined(given["TYPE"])
+        kind = joined(given["TYPE"])
         if kind.startswith(WITHOUT_CELLS):
             return
         count, meant = _form(kind)
@@ -263,8 +235,3 @@ def _number_of(node: Key, numbers: Mapping[Key, int]) -> int:
     if node not in numbers:
         raise KeyError(node[1])
     return numbers[node]
-
-
-def _joined(word: str) -> str:
-    """Return a word as the programs compare it: without blanks, in capitals."""
-    return re.sub(r"\s", "", word).upper()
