@@ -11,6 +11,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.numbers import NUMBER
+from tissuq.experiments.reading.axial_stretch import STATEMENT
 from tissuq.experiments.reading.headings import NEXT_WORD, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import WHITESPACE, split
 from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice, find_column
@@ -280,9 +281,9 @@ def _text_of_all_rows(table: Table, column: int) -> str:
 
 
 def _in_names(names: Sequence[str], pattern: str) -> str:
-    """Return the word in the last name that says a label; nothing where one says two."""
+    """Return the word in the last name that says a label; nothing where one says two. An axial stretch is none."""
     for name in reversed(names):
-        words = re.sub(r"[\s_-]+", " ", NEXT_WORD.sub(" ", name)).lower()
+        words = STATEMENT.sub(" ", re.sub(r"[\s_-]+", " ", NEXT_WORD.sub(" ", name)).lower())
         labels = {match[0] for match in re.finditer(rf"(?<!\w)(?:{pattern})(?!\w)", words)}
         if labels:
             return labels.pop() if len(labels) == 1 else ""
