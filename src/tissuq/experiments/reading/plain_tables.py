@@ -14,10 +14,11 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import GROUPED, MEAN_WITH_SPREAD, NUMBER, number_in
-from tissuq.experiments.reading.headings import heading, of_spread, plain
+from tissuq.experiments.reading.headings import heading, is_of_role, of_spread, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, joined, split
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import SPREADS
+from tissuq.experiments.units import looks_like_unit
 
 LARGEST_SHARE = 0.5
 """Share of the rows of a table beside which statements stand; a column of measurements goes on to its end."""
@@ -49,7 +50,8 @@ OF_ONE_ROW = {"maximum", "minimum"}
 """Statistics that the last measurement, too, may be."""
 
 MAY_BE_GROUPED = re.compile(r"[.,]\d{3}[.,]\d")
-PERCENTAGE = re.compile(rf"({NUMBER.pattern})\s*%")
+WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*(%|[^\W\d_]\S*)")
+"""As in ``10 %`` and ``1.2 kPa``."""
 FIRST_ROWS = 10
 """Rows of which one holds a mean with its spread where others do."""
 SPREAD_IN_NAME = re.compile(
@@ -224,7 +226,7 @@ def _rounding(cell: str) -> float:
 
 def with_plain_numbers(table: Table) -> Table:
     """Return the table with plain numbers in its cells, means and their spreads in columns of their own."""
-    return _with_spreads_apart(_without_percent_signs(_without_thousands(table)))
+    return _with_spreads_apart(_without_units(_without_thousands(table)))
 
 
 def _without_thousands(table: Table) -> Table:
@@ -256,28 +258,33 @@ def _without_thousands(table: Table) -> Table:
     )
 
 
-def _without_percent_signs(table: Table) -> Table:
-    """Return the table with the unit % for columns whose cells all have that sign, unless they state another unit.
+def _without_units(table: Table) -> Table:
+    """Return the table with a unit for columns whose cells all have that unit, unless they state another one.
 
-    Workbooks show ratios so.
+    Workbooks show ratios so, in %; other units are taken from columns of deformations and loads alone.
     """
-    if not [row for row in table.rows if "%" in row]:  # a generator is called for every row
+    if not [row for row in table.rows if "%" in row] and not any(map(WITH_UNIT.search, table.rows[:FIRST_ROWS])):
         return table
-    rows = table.cells()
-    columns = []
+    rows, unit_of = table.cells(), dict[int, str]()
     for column, cells in enumerate(zip(*rows, strict=True)):
-        filled = [cell for cell in cells if cell.lower() not in MISSING]
-        if filled and all(map(PERCENTAGE.fullmatch, filled)) and set(table.stated_units(column)) <= {"", "%"}:
-            columns.append(column)
-    if not columns:
+        matches = (WITH_UNIT.fullmatch(cell) for cell in cells if cell.lower() not in MISSING)
+        stated = {match[2] if match else "" for match in matches}
+        unit = stated.pop() if len(stated) == 1 else ""
+        is_known = unit == "%" or (is_of_role(table.names[column]) and looks_like_unit(unit))
+        if unit and is_known and set(table.stated_units(column)) <= {"", unit}:
+            unit_of[column] = unit
+    if not unit_of:
         return table
-    units = ["%" if column in columns else unit for column, unit in enumerate(table.units)]
+    units = [unit_of.get(column, unit) for column, unit in enumerate(table.units)]
     without = [
-        [PERCENTAGE.sub(r"\1", cell) if column in columns else cell for column, cell in enumerate(row)] for row in rows
+        [WITH_UNIT.sub(r"\1", cell) if column in unit_of else cell for column, cell in enumerate(row)] for row in rows
     ]
-    names = " and ".join(map(table.label, columns))
-    note = f"{names}: the cells are percentages, and were read as numbers in %."
-    return replace(table.with_cells(without), units=tuple(units)).noted(note)
+    notes = []
+    for unit in dict.fromkeys(unit_of.values()):
+        names = " and ".join(table.label(column) for column in unit_of if unit_of[column] == unit)
+        what = "percentages" if unit == "%" else "numbers with their unit"
+        notes.append(f"{names}: the cells are {what}, and were read as numbers in {unit}.")
+    return replace(table.with_cells(without), units=tuple(units)).noted(*notes)
 
 
 def _with_spreads_apart(table: Table) -> Table:

@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import MISSING, SPREADSHEET_ERRORS, WHITESPACE, joined, split
-from tissuq.experiments.units import BRACKETS
+from tissuq.experiments.units import BRACKETS, looks_like_unit
 
 Column = FloatArray
 Lines = list[tuple[int, str]]
@@ -280,6 +280,12 @@ def _problem(cell: str) -> str:
         return f"'{cell}' seems to have a thousands separator. Write numbers without one."
     if NUMBER.fullmatch(cell.rstrip(" %")):
         return f"'{cell}' is a percentage. Write plain numbers, and the unit % in the heading."
+    unit = NUMBER.sub("", cell, count=1).strip() if NUMBER.match(cell) else ""
+    if unit[:1].isalpha() and looks_like_unit(unit):
+        return (
+            f"'{cell}' is a number with its unit, which is read where all cells of a column have the same one, and its "
+            "heading has no other. Write plain numbers, and the unit in the heading."
+        )
     if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
         return f"'{cell}' is not a finite number. Fill in the value."
     return f"'{cell}' is not a number. Correct it."

@@ -143,7 +143,7 @@ def _of_data_frame(data: Any) -> Table:
     )
     if is_units_row(first_row := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
         table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first_row))
-    return without_summary(table)
+    return without_summary(with_plain_numbers(table))
 
 
 def _read_every_line(
