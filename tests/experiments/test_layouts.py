@@ -362,6 +362,12 @@ def test_cells_of_several_units_or_another_one_than_the_heading_are_asked_about(
         tq.read(path)
 
 
+def test_names_of_tests_that_are_loads_with_their_unit_stay_names(tmp_path):
+    rows = [f"{1 + x:.6f},{factor * y:.6f},{load}" for load, factor in (("5 N", 1.0), ("10 N", 1.1)) for x, y in CURVE]
+    tests = read_tests(written(tmp_path / "loads.csv", "stretch,stress (MPa),Load", *rows))
+    assert [test.name for test in tests] == ["5 N", "10 N"]
+
+
 def test_sizes_with_units_in_a_sheet_of_their_own_make_no_table(tmp_path):
     path = tmp_path / "sizes.csv"
     path.write_text("\n".join(["Width;Length", *["5 mm;20 mm"] * 8]), encoding="utf-8")

@@ -52,6 +52,8 @@ OF_ONE_ROW = {"maximum", "minimum"}
 MAY_BE_GROUPED = re.compile(r"[.,]\d{3}[.,]\d")
 WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*(%|[^\W\d_]\S*)")
 """As in ``10 %`` and ``1.2 kPa``."""
+ROWS_OF_LABEL = 5
+"""Rows one after another that have the same cell, on average, where it is the name of a test and not measured."""
 FIRST_ROWS = 10
 """Rows of which one holds a mean with its spread where others do."""
 SPREAD_IN_NAME = re.compile(
@@ -261,16 +263,17 @@ def _without_thousands(table: Table) -> Table:
 def _without_units(table: Table) -> Table:
     """Return the table with a unit for columns whose cells all have that unit, unless they state another one.
 
-    Workbooks show ratios so, in %; other units are taken from columns of deformations and loads alone.
+    Workbooks show ratios so, in %; other units are taken from measured columns of deformations and loads alone.
     """
     if not [row for row in table.rows if "%" in row] and not any(map(WITH_UNIT.search, table.rows[:FIRST_ROWS])):
         return table
     rows, unit_of = table.cells(), dict[int, str]()
     for column, cells in enumerate(zip(*rows, strict=True)):
-        matches = (WITH_UNIT.fullmatch(cell) for cell in cells if cell.lower() not in MISSING)
-        stated = {match[2] if match else "" for match in matches}
+        filled = [cell for cell in cells if cell.lower() not in MISSING]
+        stated = {match[2] if match else "" for match in map(WITH_UNIT.fullmatch, filled)}
         unit = stated.pop() if len(stated) == 1 else ""
-        is_known = unit == "%" or (is_of_role(table.names[column]) and looks_like_unit(unit))
+        is_measured = sum(cell != next_cell for cell, next_cell in pairwise(filled)) > len(filled) / ROWS_OF_LABEL
+        is_known = unit == "%" or (is_measured and is_of_role(table.names[column]) and looks_like_unit(unit))
         if unit and is_known and set(table.stated_units(column)) <= {"", unit}:
             unit_of[column] = unit
     if not unit_of:
