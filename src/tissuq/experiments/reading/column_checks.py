@@ -218,7 +218,8 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
                 f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
                 f"{table.label(column_of_type)} is {strain_type or stress_type}. {say_which(unstated)}"
             )
-    types = (choice.deformation, "strain", strain_type), (choice.stress, "stress", stress_type)
+    of_stress = stress_type if choice.load == "stress" else ""
+    types = (choice.deformation, "strain", strain_type), (choice.stress, "stress", of_stress)
     for column, kind, measure in types:
         if measure and measure not in (STRAIN_MEASURES if kind == "strain" else STRESS_MEASURES):
             raise InputError(
