@@ -173,3 +173,10 @@ def test_questions_are_answered_in_a_terminal(negative):
     assert "Written: study.toml" in shown
     np.testing.assert_allclose(tq.read(negative, length="20 mm", area="10 mm2", turn="load").stress, STRESS, atol=1e-8)
     assert 'turn = "load"' in (negative.parent / "study.toml").read_text()
+
+
+def test_columns_that_stand_beside_one_another_in_a_message_are_one_answer():
+    text = "Say all of it: --column stretch=X --column stress=Y --stress-unit kPa, or --column stress=NAME (or force=)."
+    found = [answer.text for answer in answers_in(text, ["A"], {})]
+    together = "--column stretch=X --column stress=Y --stress-unit kPa"
+    assert found == [together, "--column stress=A", "--column force=A"]

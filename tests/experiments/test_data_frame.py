@@ -199,3 +199,9 @@ def test_a_fit_of_files_and_tables_is_that_of_their_experiments(is_file, tmp_pat
 
 def test_every_part_of_an_option_is_an_option_of_its_own():
     assert PARTS.keys() <= PythonOptions.__annotations__.keys()
+
+
+def test_cells_with_their_unit_are_read_as_those_of_a_file():
+    cells = {"stretch": [1.0, 1.1, 1.2], "stress": ["0 kPa", "1.2 kPa", "2.5 kPa"]}
+    with pytest.warns(UserWarning, match="read as numbers in kPa"):
+        assert tq.read(cells).stress.tolist() == pytest.approx([0, 0.0012, 0.0025])

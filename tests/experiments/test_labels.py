@@ -78,6 +78,18 @@ def test_words_in_the_name_of_a_file_say_them(tmp_path, name, labels):
         tq.read(path, mode="uniaxial", only={"direction": "radial"})
 
 
+@pytest.mark.parametrize(
+    "line", ["Axial pre-stretch ratio 150%", "Axial stretch (lambda_z): 1.5", "axial strain = 50 %"]
+)
+def test_an_axial_stretch_above_the_table_is_no_direction(tmp_path, line):
+    data = tq.read(written(tmp_path / "test.csv", "stretch,stress (kPa)", *rows(1.0)))
+    above = tmp_path / "above.csv"
+    above.write_text(f"{line}\n{(tmp_path / 'test.csv').read_text(encoding='utf-8')}", encoding="utf-8")
+    assert (tq.read(above).direction, data.direction) == ("", "")
+    above.write_text(above.read_text(encoding="utf-8").replace(line, "Axial strip 3"), encoding="utf-8")
+    assert tq.read(above).direction == "axial"
+
+
 def test_they_are_written_with_the_data_and_kept_in_a_posterior(by_column, tmp_path):
     tests = tq.read_tests(by_column)
     write_csv(tmp_path / "data.csv", data_file(tq.Experiment.of(tests))["data.csv"])

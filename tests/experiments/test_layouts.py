@@ -9,11 +9,14 @@ import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
+from tissuq.experiments.units import stress_unit
 
 SIZES = {"length": "20 mm", "area": "10 mm2"}
 STRETCH = ramp()
 MOVED, FORCE = 20 * (STRETCH - 1), 10 * neo_hookean(STRETCH)
 """Of a specimen of 20 mm with 10 mm²."""
+CURVE = list(zip((STRETCH - 1).tolist(), neo_hookean(STRETCH).tolist(), strict=True))
+"""Strains and stresses."""
 
 
 def lines_of(*columns, separator=","):
@@ -326,3 +329,60 @@ def test_a_load_along_one_of_two_axes_is_read_alone_as_the_message_says(tmp_path
         read_tests(path)
     (test,) = read_tests(path, axis="x", mode="planar")
     assert (test.mode.name, test.size) == ("planar", len(STRETCH))
+
+
+@pytest.mark.parametrize("separator", [";", "\t", ","])
+@pytest.mark.parametrize("unit", ["kPa", "kPa ", "MPa", "N/mm2"])
+def test_a_unit_in_every_cell_of_a_column_is_its_unit(tmp_path, separator, unit):
+    rows = [f"{100 * x!r} %{separator}{y!r} {unit}" for x, y in CURVE]
+    path = tmp_path / "test.csv"
+    path.write_text("\n".join(["made today", f"strain{separator}stress", *rows]), encoding="utf-8")
+    with pytest.warns(
+        UserWarning, match="'stress': the cells are numbers with their unit, and were read as numbers in"
+    ):
+        data = tq.read(path)
+    np.testing.assert_allclose(data.stretch, [1 + x for x, _ in CURVE], rtol=1e-9)
+    np.testing.assert_allclose(data.stress, [y * stress_unit(unit).to_mpa for _, y in CURVE])
+
+
+@pytest.mark.parametrize(
+    ("name", "cells"),
+    [
+        ("stress", ["0 kPa", "1 kPa", "2 MPa"]),
+        ("stress (MPa)", ["0 kPa", "1 kPa", "2 kPa"]),
+        ("stress", ["0 kPa", "1 kPa", "2"]),
+    ],
+)
+def test_cells_of_several_units_or_another_one_than_the_heading_are_asked_about(tmp_path, name, cells):
+    path = tmp_path / "test.csv"
+    path.write_text(
+        "\n".join([f"stretch;{name}", *(f"1.{k};{cell}" for k, cell in enumerate(cells))]), encoding="utf-8"
+    )
+    with pytest.raises(tq.InputError, match=r"line 2, column 'stress.*': '0 kPa' is a number with its unit"):
+        tq.read(path)
+
+
+def test_names_of_tests_that_are_loads_with_their_unit_stay_names(tmp_path):
+    rows = [f"{1 + x:.6f},{factor * y:.6f},{load}" for load, factor in (("5 N", 1.0), ("10 N", 1.1)) for x, y in CURVE]
+    tests = read_tests(written(tmp_path / "loads.csv", "stretch,stress (MPa),Load", *rows))
+    assert [test.name for test in tests] == ["5 N", "10 N"]
+
+
+def test_sizes_with_units_in_a_sheet_of_their_own_make_no_table(tmp_path):
+    path = tmp_path / "sizes.csv"
+    path.write_text("\n".join(["Width;Length", *["5 mm;20 mm"] * 8]), encoding="utf-8")
+    with pytest.raises(tq.InputError, match="holds no rows of numbers"):
+        tq.read(path)
+
+
+def test_curves_of_a_picture_are_asked_about_once(tmp_path):
+    path = tmp_path / "picture.csv"
+    rows = [f"{1 + x:.6f},{y:.6f},{1 + 2 * x:.6f},{y:.6f}" for x, y in CURVE]
+    path.write_text("\n".join(["Control,,Treated,", "X,Y,X,Y", *rows]), encoding="utf-8")
+    with pytest.raises(tq.InputError, match="--column stretch=X --column stress=Y --stress-unit kPa"):
+        read_tests(path)
+    tests = read_tests(path, stretch="X", stress="Y", unit="kPa")
+    assert [test.name for test in tests] == ["Control", "Treated"]
+    np.testing.assert_allclose(tests[1].stretch, [1 + 2 * x for x, _ in CURVE], rtol=1e-6)
+    with pytest.raises(tq.InputError, match="--column shear=X --column stress=Y --stress-unit kPa"):
+        read_tests(path, mode="simple-shear")

@@ -342,3 +342,17 @@ def test_no_other_measure_is_read_as_the_engineering_one_without_a_word(tmp_path
         return
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
     np.testing.assert_allclose(data.stress, P11, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("strain", "stress", "words"),
+    [
+        ("Green strain x", "Green strain y", "is read as stress, and its name says 'green'"),
+        ("PK2 stress x", "PK2 stress y", "is read as strain, and its name says 'second-piola-kirchhoff'"),
+    ],
+)
+def test_a_strain_is_no_type_of_stress_and_a_stress_none_of_strain(tmp_path, strain, stress, words):
+    path = tmp_path / "test.csv"
+    path.write_text(f"{strain},{stress}\n0,0\n0.1,1\n0.2,2\n", encoding="utf-8")
+    with pytest.raises(tq.InputError, match=words):
+        tq.read(path, strain=strain, stress=stress)

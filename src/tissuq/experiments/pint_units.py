@@ -14,6 +14,15 @@ UNIT_EXPRESSION = re.compile(
     r"(?:[^\W\d]\w*|(?:\^|\*\*)\s*\(?[+-]?\d(?:\.\d)?\)?(?!\s*[\d^*])|1(?![\d.])|[%‰°*/·.()\s⁻⁰¹²³⁴⁵⁶⁷⁸⁹])++"
 )
 """Products, quotients and powers of names, and no arithmetic of numbers, which could take for ever."""
+NO_STRESSES = {
+    "[mass] / [length]**2": "a mass over an area, not a stress. If the unit of force is meant, write it as a force: "
+    "kgf/cm2, gf/mm2 or lbf/in2 (psi).",
+    "[force] / [length]": "a force over a width, not a stress. Say that the column holds forces (--column force=NAME) "
+    "and give the undeformed thickness (--thickness).",
+    "[force]": "a force, not a stress. Say that the column holds forces (--column force=NAME) and give the undeformed "
+    "cross-section (--area).",
+}
+"""What units are that are taken for those of stress, by their dimensions, and what to do."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
 
 
@@ -46,23 +55,10 @@ def stress_factor(name: str) -> float:
         quantity = _parsed_by_pint(spelling)
         if quantity is not None and quantity.check("[pressure]"):
             return float(quantity.to("megapascal").magnitude)
-        if quantity is not None and quantity.check("[mass] / [length]**2"):
-            raise InputError(
-                f"'{name}' is a mass over an area, not a stress. If the unit of force is meant, write it as "
-                "a force: kgf/cm2, gf/mm2 or lbf/in2 (psi)."
-            )
-        if quantity is not None and quantity.check("[force] / [length]"):
-            raise InputError(
-                f"'{name}' is a force over a width, not a stress. Say that the column holds forces (--column "
-                "force=NAME) and give the undeformed thickness (--thickness)."
-            )
-        if quantity is not None and quantity.check("[force]"):
-            raise InputError(
-                f"'{name}' is a force, not a stress. Say that the column holds forces (--column force=NAME) and give "
-                "the undeformed cross-section (--area)."
-            )
         if quantity is not None:
-            raise InputError(f"'{name}' is not a unit of stress (a force over an area). {SUGGESTED_UNITS}")
+            other = f"not a unit of stress (a force over an area). {SUGGESTED_UNITS}"
+            what = next((what for dimensions, what in NO_STRESSES.items() if quantity.check(dimensions)), other)
+            raise InputError(f"'{name}' is {what}")
     raise InputError(f"the unit '{name}' is not known. {SUGGESTED_UNITS}")
 
 

@@ -98,7 +98,8 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
             roles = [value.partition("=")[0], *re.findall(r"(\w+)=", others[1] if others else "")]
             names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
             pairs = [f"{role}={column}" for role in roles for column in names] if names else [value]
-            answers += [Answer((("column", pair),)) for pair in pairs]
+            before = answers.pop().options if is_joined and pairs == [value] else ()
+            answers += [Answer((*before, ("column", pair))) for pair in pairs]
         elif name in CHOICES and not value:
             choices = imported(CHOICES[name])
             answers += [Answer(((name, choice),)) for choice in (choices() if callable(choices) else choices)]

@@ -1,31 +1,45 @@
-"""The axial stretch at which a tube is held: given for all rows or in a column, and what it means for the stress."""
+"""The axial stretch of a tube: given, in a line above its table or in a column, and what it means for the stress."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import InflatedTube, LoadingMode, ThinTube
+from tissuq.experiments.numbers import NUMBER, number_in
 from tissuq.experiments.reading.column_units import factor_of
-from tissuq.experiments.reading.columns_of_tube import (
-    HOW_TO_READ_TUBE,
-    HOW_TO_SAY_AXIAL_STRETCH,
-    column_of_axial_stretch,
-    is_axial_displacement,
-    is_of_length,
-)
-from tissuq.experiments.reading.dimensions import Dimensions
+from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS
 from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.reading.recognition import PRESSURE, TOTAL_FORCE, ColumnChoice
-from tissuq.experiments.reading.stated_axial_stretch import LARGEST, stated_axial_stretch
+from tissuq.experiments.reading.recognition import PRESSURE, TOTAL_FORCE, ColumnChoice, find_column
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tube import SAME_STRETCH, Tube, rows_at_each_stretch
-from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
-from tissuq.experiments.units import LENGTH, strain_factor
+from tissuq.experiments.reading.vocabulary import (
+    AXIAL_STRAIN,
+    AXIAL_STRETCH,
+    LENGTH_OF_TUBE,
+    ROLE_OF_AXIAL_STRETCH,
+    ROLES,
+)
+from tissuq.experiments.units import LENGTH, measured_in, strain_factor
 
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.dimensions import Dimensions
+
+LEAST, LARGEST = 0.9, 4.0
+"""Axial stretches beyond which a number is hardly one: a strain below them, percent above."""
+BETWEEN_LETTERS = re.compile(r"(?<=[^\W\d])[-_](?=[^\W\d])")
+STATEMENT = re.compile(
+    rf"(?<!\w)(?:(?P<stretch>{AXIAL_STRETCH.pattern})|(?P<strain>{AXIAL_STRAIN.pattern}))"
+    rf"( (λ|lambda) ?z?)?\s*([\[(](?P<unit>[^\])]*)[\])])?[\s:=;|,{SEPARATOR_OF_CELLS}]*((of|is|was)\s+)?"
+    rf"(?P<number>{NUMBER.pattern})\s*(?P<percent>%)?(\s*(±|\+/-)\s*{NUMBER.pattern}\s*%?)?\s*(mm/mm)?"
+    rf"\s*(?=\.?$|[()]|\.\s|[;|,\t{SEPARATOR_OF_CELLS}](?!\s*[.\d]))"
+)
+"""As in ``Axial stretch (lambda_z): 1.5`` and ``axial strain = 50 %``, and no list of them, or a range."""
 ROWS_AT_EACH = 3
 """Rows at each axial stretch, on average at least, where it is held."""
 NOTABLE_STRETCH = 0.1
@@ -39,6 +53,19 @@ AT_ITS_LENGTH = (
 )
 
 
+HOW_TO_SAY_AXIAL_STRETCH = (
+    "its length over that when it is neither stretched nor inflated: --axial-stretch 1.5 (in Python "
+    f"axial_stretch=1.5), or --column {ROLE_OF_AXIAL_STRETCH}=NAME for a column of it, or of the length or the axial "
+    'displacement, with --length "8 mm" for the undeformed length.'
+)
+HOW_TO_READ_TUBE = (
+    'If it was held at its undeformed length, give --mode planar --diameter "3 mm" --thickness "0.5 mm": its '
+    "undeformed outer diameter and the thickness of its wall. If it was stretched along its axis first, give these and "
+    "--mode inflated-tube --axial-stretch 1.5, where the file has no column of it. Where the axial force was measured, "
+    "too, give --mode thin-tube and --column force=NAME."
+)
+"""How a tube is read."""
+
 WHICH_FORCE = {
     "": "Its axial stress is not read, so that a fit knows what the material does along the axis only as far as the "
     "hoop stress shows it.",
@@ -48,6 +75,103 @@ WHICH_FORCE = {
     "machine pulls with it in addition to that, give --column force=NAME.",
 }
 """What is to know of the axial force, by the role of its column, or without one."""
+
+
+@dataclass(frozen=True)
+class StatedAxialStretch:
+    """An axial stretch of all rows, what says it, and where that stands after the name of the file: ``, line 2``."""
+
+    value: float
+    source: str
+    place: str = ""
+
+
+def stated_axial_stretch(table: Table, options: ReadingOptions) -> StatedAxialStretch | None:
+    """Return the axial stretch of all rows of a tube that the options or the lines above its table say.
+
+    Raises
+    ------
+    InputError
+        When these contradict each other, or a line states what is hardly one.
+    """
+    in_lines, given = [*_in_lines(table)], options.get("axial_stretch")
+    others = [one for one in in_lines if given is not None and abs(one.value - given) > SAME_STRETCH]
+    if given is not None and others:
+        raise InputError(
+            f"{table.file}{others[0].place}: the axial stretch is {others[0].value:g} by {others[0].source}, and "
+            f"--axial-stretch says {given:g}. Leave that out, or the line out of the file."
+        )
+    if given is not None:
+        return StatedAxialStretch(float(given), "as given")
+    if any(abs(one.value - in_lines[0].value) > SAME_STRETCH for one in in_lines):
+        raise InputError(
+            f"{table.file}: the axial stretch of the tube is {in_lines[0].source}, and another by "
+            f"{in_lines[-1].source}: say which it is, such as --axial-stretch 1.5."
+        )
+    return in_lines[0] if in_lines else None
+
+
+def _in_lines(table: Table) -> Iterator[StatedAxialStretch]:
+    for line, text in table.head:
+        match = STATEMENT.search(BETWEEN_LETTERS.sub(" ", text.replace('"', "")).lower())
+        if not match:
+            continue
+        shown = f"'{' '.join(text.strip('# ,;').replace(SEPARATOR_OF_CELLS, ' ').split())}'"
+        is_percent = bool(match["percent"]) or (match["unit"] or "").strip() == "%"
+        number = number_in(match["number"]) * (0.01 if is_percent else 1.0)
+        value = 1 + number if match["strain"] else number
+        if not LEAST <= value <= LARGEST:
+            raise InputError(
+                f"{table.file}, line {line}: {shown} is {value:g} times the undeformed length of the tube, which is "
+                "hardly its axial stretch. Write that there as a deformed over an undeformed length, such as 1.5."
+            )
+        yield StatedAxialStretch(value, f"line {line}, {shown}", f", line {line}")
+
+
+def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None:
+    """Return the column of the axial stretch, or of the length, in its role or by its name; None where there is none.
+
+    A length that is the same in all rows may be the undeformed one, unless that is given. With it a displacement of the
+    machine tells the length, too.
+
+    Raises
+    ------
+    InputError
+        When several may be it.
+    """
+    columns_given = options.get("columns") or {}
+    for role in (ROLE_OF_AXIAL_STRETCH, "length"):
+        if (wanted := columns_given.get(role)) is not None:
+            return find_column(table, role, wanted)
+    columns = [column for column, quantity in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(quantity)]
+    if not columns and stated_axial_stretch(table, options) is None:
+        is_known = "length" in (options.get("dimensions") or {})
+        columns = [
+            column
+            for column, quantity in enumerate(table.quantities)
+            if is_of_length(table, column)
+            and (
+                (LENGTH_OF_TUBE.fullmatch(quantity) and (is_known or not table.is_constant(column)))
+                or (is_known and is_axial_displacement(table, column))
+            )
+        ]
+    if len(columns) > 1:
+        labels = " and ".join(map(table.label, columns))
+        raise InputError(
+            f"{table.file}: columns {labels} may each be the axial stretch of a tube, or its length. Say which it is: "
+            f"--column {ROLE_OF_AXIAL_STRETCH}=NAME."
+        )
+    return columns[0] if columns else None
+
+
+def is_of_length(table: Table, column: int) -> bool:
+    """Tell whether a column has a unit of length."""
+    return measured_in(table.unit(column)) == "length"
+
+
+def is_axial_displacement(table: Table, column: int) -> bool:
+    """Tell whether a column of lengths holds what a tube is longer by, by its name."""
+    return table.quantities[column] in ROLES["displacement"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
     LENGTHENINGS,
@@ -216,6 +217,14 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
             raise InputError(
                 f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
                 f"{table.label(column_of_type)} is {strain_type or stress_type}. {say_which(unstated)}"
+            )
+    of_stress = stress_type if choice.load == "stress" else ""
+    types = (choice.deformation, "strain", strain_type), (choice.stress, "stress", of_stress)
+    for column, kind, measure in types:
+        if measure and measure not in (STRAIN_MEASURES if kind == "strain" else STRESS_MEASURES):
+            raise InputError(
+                f"{table.place(column)} is read as {kind}, and its name says '{measure}', which is no type of {kind}. "
+                f"Give another column as {kind} (--column {kind}=NAME), or rename it."
             )
     return replace(choice, strain_type=strain_type or "engineering", stress_type=stress_type or "engineering")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import isclose
 from typing import Literal
 
 import numpy as np
@@ -13,7 +15,7 @@ from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, Quantity
 
-UnitOption = Literal["force_unit", "displacement_unit", "strain_unit"]
+UnitOption = Literal["force_unit", "displacement_unit", "strain_unit", "stress_unit"]
 """Options of reading that state the unit of a column."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"
 LARGEST_ASSUMED_STRESS = 100.0
@@ -41,70 +43,61 @@ def factor_of(
     table: Table, column: int, quantity: Quantity, option: UnitOption, options: ReadingOptions
 ) -> tuple[float, str]:
     """Return the factor from a column's unit, which an option may state, and the words for where it comes from."""
-    unit, declared = options.get(option), declared_unit(table, column)
-    if unit is not None:
-        factor, in_file = quantity.factor(unit), quantity.factor_or_none(declared)
-        if in_file is not None and in_file != factor:
-            raise _says_another(table, column, option, unit, declared)
-        return factor, f"{unit} (as given)"
+    declared = declared_unit(table, column)
     proposed = units.MASSES.get(declared.lower(), quantity.unit) if quantity is FORCE else quantity.unit
     hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
-    if not declared:
+    unit, source = stated_unit(table, column, declared, quantity.factor, option, options, hint)
+    if not unit:
         raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")
-    try:
-        return quantity.factor(declared), f"{declared} (from the file)"
-    except InputError as error:
-        raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
+    return quantity.factor(unit), f"{unit} ({source})"
 
 
-def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, options: ReadingOptions) -> float:
-    """Return what one unit of a column of strains is as a plain ratio."""
-    strain_unit = options.get("strain_unit")
+def stated_unit(
+    table: Table,
+    column: int,
+    declared: str,
+    factor: Callable[[str], float],
+    option: UnitOption,
+    options: ReadingOptions,
+    hint: str,
+) -> tuple[str, str]:
+    """Return the unit that an option states for a column, or else the declared one, and where it comes from.
+
+    Raises
+    ------
+    InputError
+        When the declared one is none of what the column holds, with how to say it, or an option states another one.
+    """
+    given, in_file = options.get(option), None
     try:
-        in_file = units.strain_factor(declared)
+        in_file = factor(declared) if declared else None
     except InputError as error:
-        if strain_unit is None:
-            hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.measure == "strain" else ""
-            raise InputError(f"{table.place(choice.deformation)}: {error}{hint}") from error
-        declared, in_file = "", 1.0
-    if strain_unit is None:
-        return in_file
-    factor = units.strain_factor(strain_unit)
-    if declared and in_file != factor:
-        raise _says_another(table, choice.deformation, "strain_unit", strain_unit, declared)
-    return factor
+        if given is None:
+            how = f" To say it yourself, {hint}." if hint else ""
+            raise InputError(f"{table.place(column)}: {error}{how}") from error
+    if given is None:
+        return declared, "from the file"
+    if in_file is not None and not isclose(in_file, factor(given), rel_tol=1e-9):
+        raise InputError(
+            f"{table.place(column)}: {option}='{given}' is given, but the file says '{declared}'. Leave {option} "
+            f"(--{option.replace('_', '-')}) out, or correct the file."
+        )
+    return given, "as given"
 
 
 def stress_unit_of(
     table: Table, choice: ColumnChoice, values: Column, options: ReadingOptions
 ) -> tuple[units.StressUnit, str]:
     """Return the unit of stresses, and the words for where it comes from."""
-    declared, stress_unit = declared_unit(table, choice.stress), options.get("stress_unit")
-    if stress_unit is None and not declared:
+    column, declared, hint = choice.stress, declared_unit(table, choice.stress), "give stress_unit (--stress-unit)"
+    name, source = stated_unit(
+        table, column, declared, lambda text: units.stress_unit(text).to_mpa, "stress_unit", options, hint
+    )
+    if not name:
         _check_assumed_mpa(table, choice, float(np.abs(values).max()))
         return units.StressUnit("MPa", 1.0), MPA_ASSUMED
-    try:
-        in_file = units.stress_unit(declared)
-    except InputError as error:
-        if stress_unit is None:
-            hint = "To say it yourself, give stress_unit (--stress-unit)."
-            raise InputError(f"{table.place(choice.stress)}: {error} {hint}") from error
-        return (unit := units.stress_unit(stress_unit)), f"{unit.name} (as given)"
-    if stress_unit is None:
-        return in_file, f"{in_file.name} (from the file)"
-    unit = units.stress_unit(stress_unit)
-    if not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
-        raise _says_another(table, choice.stress, "stress_unit", stress_unit, declared)
-    return unit, f"{unit.name} (as given)"
-
-
-def _says_another(table: Table, column: int, option: str, unit: str, declared: str) -> InputError:
-    """Return that an option states another unit of a column than the file."""
-    flag = f"--{option.replace('_', '-')}"
-    return InputError(
-        f"{table.place(column)}: {option}='{unit}' is given, but the file says '{declared}'. Leave {option} ({flag}) "
-        "out, or correct the file."
-    )
+    unit = units.stress_unit(name)
+    return unit, f"{unit.name} ({source})"
 
 
 def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> None:

@@ -6,6 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import InflatedTube, LoadingMode, Planar, ThinTube
+from tissuq.experiments.reading.axial_stretch import (
+    HOW_TO_READ_TUBE,
+    HOW_TO_SAY_AXIAL_STRETCH,
+    column_of_axial_stretch,
+    stated_axial_stretch,
+)
 from tissuq.experiments.reading.column_checks import with_types
 from tissuq.experiments.reading.headings import STRESS_NOUNS
 from tissuq.experiments.reading.options import ReadingOptions
@@ -17,11 +23,8 @@ from tissuq.experiments.reading.recognition import (
     Contents,
     find_column,
 )
-from tissuq.experiments.reading.stated_axial_stretch import stated_axial_stretch
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import (
-    AXIAL_STRETCH,
-    LENGTH_OF_TUBE,
     ROLE_OF_AXIAL_STRETCH,
     ROLES,
     other_quantity,
@@ -32,18 +35,6 @@ FORCES = ("force", TOTAL_FORCE)
 """Roles of an axial force: without what the pressure on the closed ends pulls with, and with it."""
 ROLES_BESIDE = ("length", ROLE_OF_AXIAL_STRETCH)
 """Either is of what tells the axial stretch."""
-HOW_TO_SAY_AXIAL_STRETCH = (
-    "its length over that when it is neither stretched nor inflated: --axial-stretch 1.5 (in Python "
-    f"axial_stretch=1.5), or --column {ROLE_OF_AXIAL_STRETCH}=NAME for a column of it, or of the length or the axial "
-    'displacement, with --length "8 mm" for the undeformed length.'
-)
-HOW_TO_READ_TUBE = (
-    'If it was held at its undeformed length, give --mode planar --diameter "3 mm" --thickness "0.5 mm": its '
-    "undeformed outer diameter and the thickness of its wall. If it was stretched along its axis first, give these and "
-    "--mode inflated-tube --axial-stretch 1.5, where the file has no column of it. Where the axial force was measured, "
-    "too, give --mode thin-tube and --column force=NAME."
-)
-"""How a tube is read."""
 
 
 def mode_of_tube(table: Table, options: ReadingOptions) -> tuple[str, str]:
@@ -113,52 +104,6 @@ def columns_of_tube(table: Table, mode: LoadingMode, options: ReadingOptions) ->
         ),
     )
     return dict(zip(mode.stresses, (with_types(table, choice, contents) for choice in choices), strict=True))
-
-
-def column_of_axial_stretch(table: Table, options: ReadingOptions) -> int | None:
-    """Return the column of the axial stretch, or of the length, in its role or by its name; None where there is none.
-
-    A length that is the same in all rows may be the undeformed one, unless that is given. With it a displacement of the
-    machine tells the length, too.
-
-    Raises
-    ------
-    InputError
-        When several may be it.
-    """
-    columns_given = options.get("columns") or {}
-    for role in (ROLE_OF_AXIAL_STRETCH, "length"):
-        if (wanted := columns_given.get(role)) is not None:
-            return find_column(table, role, wanted)
-    columns = [column for column, quantity in enumerate(table.quantities) if AXIAL_STRETCH.fullmatch(quantity)]
-    if not columns and stated_axial_stretch(table, options) is None:
-        is_known = "length" in (options.get("dimensions") or {})
-        columns = [
-            column
-            for column, quantity in enumerate(table.quantities)
-            if is_of_length(table, column)
-            and (
-                (LENGTH_OF_TUBE.fullmatch(quantity) and (is_known or not table.is_constant(column)))
-                or (is_known and is_axial_displacement(table, column))
-            )
-        ]
-    if len(columns) > 1:
-        labels = " and ".join(map(table.label, columns))
-        raise InputError(
-            f"{table.file}: columns {labels} may each be the axial stretch of a tube, or its length. Say which it is: "
-            f"--column {ROLE_OF_AXIAL_STRETCH}=NAME."
-        )
-    return columns[0] if columns else None
-
-
-def is_of_length(table: Table, column: int) -> bool:
-    """Tell whether a column has a unit of length."""
-    return measured_in(table.unit(column)) == "length"
-
-
-def is_axial_displacement(table: Table, column: int) -> bool:
-    """Tell whether a column of lengths holds what a tube is longer by, by its name."""
-    return table.quantities[column] in ROLES["displacement"]
 
 
 def _force(table: Table, columns: Mapping[str, str | int], quantities: Sequence[str]) -> tuple[str, int, bool]:

@@ -44,7 +44,9 @@ def measured_rows(
     """
     labels, columns = tuple(choices), list(choices.values())
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
-    check_one_specimen(table, columns, _course([deformation for deformation, _ in numbers]))
+    changes = np.array([deformation - deformation[0] for deformation, _ in numbers])
+    farthest = np.abs(changes).argmax(axis=0)  # the axis along which each row is farther from the first
+    check_one_specimen(table, columns, changes[farthest, np.arange(len(farthest))])
     specimens = names_of_specimen(table, columns, options.get("only"))
     test = test_beside(table, columns[0].stress, mode, options) if len(columns) == 1 else None
     dimensions = dimensions_of(table, options.get("dimensions"), specimens, test)
@@ -95,12 +97,6 @@ def measured_rows(
     if any(spread.source for spread in spreads):
         measured = measured.with_step(*(spread.source for spread in spreads))
     return measured, loads, tuple(spreads), dimensions
-
-
-def _course(deformations: Sequence[Column]) -> Column:
-    """Return how far each row is from the first, along the axis on which it is farther."""
-    changes = np.array([deformation - deformation[0] for deformation in deformations])
-    return np.asarray(np.take_along_axis(changes, np.abs(changes).argmax(axis=0)[None], axis=0)[0])
 
 
 def with_engineering_stress(

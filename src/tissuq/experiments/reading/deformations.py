@@ -7,7 +7,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
-from tissuq.experiments.reading.column_units import UnitOption, declared_unit, factor_of, strain_factor_of
+from tissuq.experiments.reading.column_units import UnitOption, declared_unit, factor_of, stated_unit
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words
 from tissuq.experiments.reading.dimensions_of_table import initial_size
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
@@ -80,7 +80,9 @@ def _from_ratio(
         factor, unit_source = factor_of(table, choice.deformation, ANGLE, "strain_unit", options)
         scaled = f" in {unit_source}"
     else:
-        factor = strain_factor_of(table, choice, declared, options)
+        hint = "give strain_unit (--strain-unit)" * is_strain
+        unit, _ = stated_unit(table, choice.deformation, declared, units.strain_factor, "strain_unit", options, hint)
+        factor = units.strain_factor(unit)
         scaled = "" if factor == 1 else f" x {factor:g}"
     if is_strain:
         has_unit = bool(declared or options.get("strain_unit"))

@@ -17,8 +17,8 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import InflatedTube, Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
+from tissuq.experiments.reading.axial_stretch import column_of_axial_stretch
 from tissuq.experiments.reading.columns import choose_columns
-from tissuq.experiments.reading.columns_of_tube import column_of_axial_stretch
 from tissuq.experiments.reading.conversion import (
     as_columns,
     measured_rows,
@@ -31,14 +31,13 @@ from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_c
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.python_form import refusals_worded_for, wording_for
-from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.recognition import ColumnChoice, adding
 from tissuq.experiments.reading.regions import (
     AUTO,
     Region,
     TestedStress,
     least_errors,
     regions_of,
-    slack_error,
     tested_stresses,
 )
 from tissuq.experiments.reading.rows_of_tests import (
@@ -338,7 +337,8 @@ def read_rows(
     if (preload := options.get("preload")) == AUTO:
         slacks = [tested.slack for tested in tested_stresses(used, mode, shown)]
         used = used.loaded(slacks, reference)
-        errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
+        sds = [slack.sd / (slack.stretch if reference else 1.0) for slack in slacks if slack]
+        errors = {"slack": max(sds)} if sds else errors
     elif preload is not None:
         thresholds = [load.stress_in(preload) for load in loads]
         used = used.taut(preload, thresholds, find_cycles(used.table, used.course, reference)[0].peak, reference, shown)
@@ -362,7 +362,9 @@ def read_rows(
     if (step := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
-    check_signs(used, choices, options, shown)
+    turn = options.get("turn")
+    with adding(f"Signs are turned as asked, --turn {turn}: turn others, or leave it out." if turn else ""):
+        check_signs(used, choices, options, shown)
     if mode.along_axis_1 == Uniaxial() and (volume := volume_step(used, is_taken=bool(options.get("incompressible")))):
         used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import date, time
 from typing import Any, ClassVar
@@ -103,7 +103,7 @@ def explained(path: str | os.PathLike[str], kind: str, library: str, cure: str, 
         ) from error
 
 
-def line_of(cells: Sequence[Any]) -> str:
+def line_of(cells: Iterable[Any]) -> str:
     """Return the line of a row of cells: numbers to the last digit, and nothing after the last one."""
     return SEPARATOR_OF_CELLS.join(map(as_text, cells)).rstrip(SEPARATOR_OF_CELLS)
 

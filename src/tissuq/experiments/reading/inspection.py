@@ -10,8 +10,7 @@ import numpy as np
 
 from tissuq.experiments.numbers import wrapped
 from tissuq.experiments.reading.assumptions import is_doubtful
-from tissuq.experiments.reading.axial_stretch import stretches_held
-from tissuq.experiments.reading.columns_of_tube import is_axial_displacement, is_of_length
+from tissuq.experiments.reading.axial_stretch import is_axial_displacement, is_of_length, stretches_held
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from tissuq.experiments.numbers import GROUPED, MEAN_WITH_SPREAD, NUMBER
+from tissuq.experiments.reading.headings import is_of_role
 from tissuq.experiments.units import looks_like_unit
 
 WHITESPACE = " "
@@ -31,6 +32,10 @@ KNOWN_UNITS = 2
 """Units that show that what stands beside them is one as well."""
 WORD = re.compile(r"[^\W\d_]{2}|%")
 """What a line of names or units holds, and a row of numbers does not."""
+OF_NUMBERS = frozenset("0123456789.,;|+-eE \t")
+"""Characters of rows of plain numbers."""
+UNIT_IN_CELL = re.compile(rf"((?:^|[\t;,|])\s*{NUMBER.pattern})\s*([^\W\d_][^\s;,|]*)(?=\s*(?:$|[\t;,|]))")
+"""As in ``1.2 kPa``."""
 
 Split = Callable[[str], list[str]]
 
@@ -64,8 +69,20 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
     """Return the layout of the first table in lines without blanks and comments; None if there is none.
 
     A table of a few rows, such as a machine's table of results, is passed over for a far longer one beneath it with
-    other names.
+    other names. Where there is none, numbers may have their units in the cells beneath names of deformations and loads.
     """
+    if (layout := _layout_of(lines, separator)) is not None:
+        return layout
+    plain = [UNIT_IN_CELL.sub(lambda cell: cell[1] if looks_like_unit(cell[2]) else cell[0], line) for line in lines]
+    layout = None if plain == list(lines) else _layout_of(plain, separator)
+    if layout is None or layout.names is None:
+        return None
+    names = column_names(lines[layout.names], layout.width, layout.separator)
+    return layout if any(map(is_of_role, names)) else None
+
+
+def _layout_of(lines: Sequence[str], separator: str | None) -> Layout | None:
+    """Return the layout of the first table of plain numbers."""
     separator = separator or likely_separator(lines[:LINES_FOR_SEPARATOR])
     cells = partial(split, separator=separator)
     confirmed = _main_row(lines, cells)
@@ -102,6 +119,8 @@ def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
     header = None if layout.names is None else texts[layout.names].strip()
     numeric = [column for column, cell in enumerate(cells(texts[layout.first_row])) if NUMBER.fullmatch(cell)]
     starts, last_row = list[int](), layout.first_row
+    if OF_NUMBERS.issuperset("".join(texts[layout.first_row + 1 :])):
+        return starts
     for position in range(layout.first_row + 1, len(texts)):
         text = texts[position]
         row = cells(text) if WORD.search(text) else []

@@ -14,10 +14,11 @@ import numpy as np
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import GROUPED, MEAN_WITH_SPREAD, NUMBER, number_in
-from tissuq.experiments.reading.headings import heading, of_spread, plain
+from tissuq.experiments.reading.headings import heading, is_of_role, of_spread, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, joined, split
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import SPREADS
+from tissuq.experiments.units import looks_like_unit
 
 LARGEST_SHARE = 0.5
 """Share of the rows of a table beside which statements stand; a column of measurements goes on to its end."""
@@ -48,8 +49,11 @@ FLOATING = 1e-9
 OF_ONE_ROW = {"maximum", "minimum"}
 """Statistics that the last measurement, too, may be."""
 
-MAY_BE_GROUPED = re.compile(r"\d[.,]\d{3}[.,]\d")
-PERCENTAGE = re.compile(rf"({NUMBER.pattern})\s*%")
+MAY_BE_GROUPED = re.compile(r"[.,]\d{3}[.,]\d")
+WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*(%|[^\W\d_]\S*)")
+"""As in ``10 %`` and ``1.2 kPa``."""
+ROWS_OF_LABEL = 5
+"""Rows one after another that have the same cell, on average, where it is the name of a test and not measured."""
 FIRST_ROWS = 10
 """Rows of which one holds a mean with its spread where others do."""
 SPREAD_IN_NAME = re.compile(
@@ -116,7 +120,7 @@ def without_summary(table: Table) -> Table:
         return _without_statistics(table)
     if start < max(FEWEST_MEASUREMENTS, len(table.rows) - start):
         return table
-    numbers, beneath, of_numbers = _parted(table, start)
+    numbers, beneath, of_numbers = _parted(table.cells(), start)
     names = [_statistic(row, numbers, of_numbers) for row in beneath]
     has_word = [_has_word(row, of_numbers) for row in beneath]
     if all(name or (is_apart and word) for name, word in zip(names, has_word, strict=True)):
@@ -133,11 +137,13 @@ def _without_statistics(table: Table) -> Table:
     """Return the table without last rows that are statistics of those above, unless a last measurement may be one."""
     earliest = max(FEWEST_MEASUREMENTS, len(table.rows) - MOST_ROWS)
     end = table.taken(np.arange(max(0, len(table.rows) - 3 * MOST_ROWS), len(table.rows)))
-    if earliest >= len(table.rows) or not _jumps(*_parted(end, len(end.rows) - (len(table.rows) - earliest))):
+    if earliest >= len(table.rows) or not _jumps(*_parted(end.cells(), len(end.rows) - (len(table.rows) - earliest))):
         return table
-    for start in range(earliest, len(table.rows)):
-        numbers, beneath, of_numbers = _parted(table, start)
-        names = [_statistic(row, numbers, of_numbers) for row in beneath]
+    cells = table.cells()
+    numbers, _, _ = _parted(cells, len(cells))
+    for start in range(earliest, len(cells)):
+        of_numbers = np.asarray(np.isfinite(numbers[:start]).all(axis=0))
+        names = [_statistic(row, numbers[:start], of_numbers) for row in cells[start:]]
         if all(names) and not OF_ONE_ROW.issuperset(names):
             return _without_rows(table, start, names)
     return table
@@ -157,9 +163,8 @@ def _place(table: Table, start: int) -> str:
     return f"{table.counted} {top}" if top == bottom else f"{table.counted}s {top} to {bottom}"
 
 
-def _parted(table: Table, start: int) -> tuple[FloatArray, list[tuple[str, ...]], BoolArray]:
+def _parted(cells: Sequence[Sequence[str]], start: int) -> tuple[FloatArray, Sequence[Sequence[str]], BoolArray]:
     """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
-    cells = table.cells()
     numbers = np.array([[number_in(cell) for cell in row] for row in cells[:start]])
     return numbers, cells[start:], np.isfinite(numbers).all(axis=0)
 
@@ -223,7 +228,7 @@ def _rounding(cell: str) -> float:
 
 def with_plain_numbers(table: Table) -> Table:
     """Return the table with plain numbers in its cells, means and their spreads in columns of their own."""
-    return _with_spreads_apart(_without_percent_signs(_without_thousands(table)))
+    return _with_spreads_apart(_without_units(_without_thousands(table)))
 
 
 def _without_thousands(table: Table) -> Table:
@@ -231,6 +236,8 @@ def _without_thousands(table: Table) -> Table:
 
     Numbers with both marks, such as ``1,016.9``, tell which mark they are.
     """
+    if not MAY_BE_GROUPED.search("\n".join(table.rows)):
+        return table
     lines_of_cells = {
         cell: line
         for line, row in reversed(list(zip(table.lines, table.rows, strict=True)))
@@ -253,28 +260,34 @@ def _without_thousands(table: Table) -> Table:
     )
 
 
-def _without_percent_signs(table: Table) -> Table:
-    """Return the table with the unit % for columns whose cells all have that sign, unless they state another unit.
+def _without_units(table: Table) -> Table:
+    """Return the table with a unit for columns whose cells all have that unit, unless they state another one.
 
-    Workbooks show ratios so.
+    Workbooks show ratios so, in %; other units are taken from measured columns of deformations and loads alone.
     """
-    if not [row for row in table.rows if "%" in row]:  # a generator is called for every row
+    if not [row for row in table.rows if "%" in row] and not any(map(WITH_UNIT.search, table.rows[:FIRST_ROWS])):
         return table
-    rows = table.cells()
-    columns = []
+    rows, unit_of = table.cells(), dict[int, str]()
     for column, cells in enumerate(zip(*rows, strict=True)):
         filled = [cell for cell in cells if cell.lower() not in MISSING]
-        if filled and all(map(PERCENTAGE.fullmatch, filled)) and set(table.stated_units(column)) <= {"", "%"}:
-            columns.append(column)
-    if not columns:
+        stated = {match[2] if match else "" for match in map(WITH_UNIT.fullmatch, filled)}
+        unit = stated.pop() if len(stated) == 1 else ""
+        is_measured = sum(cell != next_cell for cell, next_cell in pairwise(filled)) > len(filled) / ROWS_OF_LABEL
+        is_known = unit == "%" or (is_measured and is_of_role(table.names[column]) and looks_like_unit(unit))
+        if unit and is_known and set(table.stated_units(column)) <= {"", unit}:
+            unit_of[column] = unit
+    if not unit_of:
         return table
-    units = ["%" if column in columns else unit for column, unit in enumerate(table.units)]
+    units = [unit_of.get(column, unit) for column, unit in enumerate(table.units)]
     without = [
-        [PERCENTAGE.sub(r"\1", cell) if column in columns else cell for column, cell in enumerate(row)] for row in rows
+        [WITH_UNIT.sub(r"\1", cell) if column in unit_of else cell for column, cell in enumerate(row)] for row in rows
     ]
-    names = " and ".join(map(table.label, columns))
-    note = f"{names}: the cells are percentages, and were read as numbers in %."
-    return replace(table.with_cells(without), units=tuple(units)).noted(note)
+    notes = []
+    for unit in dict.fromkeys(unit_of.values()):
+        names = " and ".join(table.label(column) for column in unit_of if unit_of[column] == unit)
+        what = "percentages" if unit == "%" else "numbers with their unit"
+        notes.append(f"{names}: the cells are {what}, and were read as numbers in {unit}.")
+    return replace(table.with_cells(without), units=tuple(units)).noted(*notes)
 
 
 def _with_spreads_apart(table: Table) -> Table:

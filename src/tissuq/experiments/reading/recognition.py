@@ -41,6 +41,10 @@ NEITHER_LOAD_NOR_DEFORMATION = re.compile(
 """Names of columns that are no rivals, whatever their unit."""
 
 
+X_AND_Y = ("x", "y")
+"""Names of all columns of curves that were taken from a picture."""
+
+
 @dataclass(frozen=True)
 class ColumnChoice:
     """The columns (counted from 0) of the deformation and of the stress or force, and what they hold.
@@ -154,6 +158,8 @@ def recognise(
     columns = contents.fitting(*candidates)
     if len(columns) > 1:
         raise ambiguous(table, [_role_among(table, contents, candidates, column) for column in columns], columns)
+    if {*table.quantities} == {*X_AND_Y}:
+        raise _of_picture(table, {*SHEARS, "torque"}.isdisjoint(roles))
     if not columns:
         by_role = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
         hint = by_role or _of_other_quantities(table, roles) or _several_hint(table, contents, roles)
@@ -172,6 +178,22 @@ def recognise(
             f"{columns_there_are(table)} {_how_to_say(table, in_order)}"
         )
     return columns[0]
+
+
+def _of_picture(table: Table, is_lengthened: bool) -> InputError:
+    """Return that the columns of curves from a picture do not say what they hold, and all that is to be said."""
+    x, y = (table.names[table.quantities.index(name)] for name in X_AND_Y)
+    deformation = "stretch" if is_lengthened else "shear"
+    others = (
+        f" Of strains in percent: --column strain={x} --column stress={y} --strain-unit % --stress-unit kPa. Of "
+        f"displacements and forces: --column displacement={x} --column force={y} --displacement-unit mm --force-unit N "
+        '--length "20 mm" --area "10 mm2".'
+    )
+    return InputError(
+        f"{table.file}: columns {x} and {y} do not say what was measured. Say all of it at once, for all curves: "
+        f'--column {deformation}={x} --column stress={y} --stress-unit kPa (in Python {deformation}="{x}", '
+        f'stress="{y}", unit="kPa").{others * is_lengthened}'
+    )
 
 
 def _role_among(table: Table, contents: Contents, candidates: Sequence[str], column: int) -> str:

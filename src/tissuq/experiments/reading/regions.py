@@ -173,11 +173,6 @@ def tested_stresses(used: MeasuredRows, mode: LoadingMode, unit: StressUnit) -> 
     return tuple(TestedStress(used, number, cycles, mode, unit) for number in range(len(used.labels)))
 
 
-def slack_error(slacks: Sequence[Slack | None], reference: float) -> float:
-    """Return the standard deviation of the stretch at which the specimen is free of stress: the largest of all axes."""
-    return max(slack.sd / (slack.stretch if reference else 1.0) for slack in slacks if slack)
-
-
 def regions_of(tested: TestedStress) -> list[Region]:
     """Return what happened in a test, kind by kind."""
     return [region for check in CHECKS for region in check(tested)]

@@ -12,7 +12,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.options import TURNS, ReadingOptions
-from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice, adding
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import StressUnit
@@ -155,14 +155,6 @@ def check_signs(
 
     Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
     """
-    turn = options.get("turn")
-    with adding(f"Signs are turned as asked, --turn {turn}: turn others, or leave it out." if turn else ""):
-        _check_work(measured, choices, bool(options.get("compression_positive")), unit)
-
-
-def _check_work(
-    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, unit: StressUnit
-) -> None:
     choice, stretch, stress = choices[0], measured.stretch[0], measured.stress[0]
     if choice.measure in SHEARS:
         row = _wrong_sign(1 + stretch, stress, np.ones(len(stretch), dtype=bool))
@@ -193,7 +185,7 @@ def _check_work(
     are_wrong = [_wrong_sign(stretch, stress, stretch != 1) is not None for _, stretch, stress in axes]
     advice = "" if len(axes) == 1 else TURN_ALL if all(are_wrong) else TURN_ONE
     for axis in axes:
-        _check_signs(clear.table, *axis, compression_positive, advice, unit)
+        _check_signs(clear.table, *axis, bool(options.get("compression_positive")), advice, unit)
 
 
 def _check_signs(

@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import MISSING, SPREADSHEET_ERRORS, WHITESPACE, joined, split
-from tissuq.experiments.units import BRACKETS
+from tissuq.experiments.units import BRACKETS, looks_like_unit
 
 Column = FloatArray
 Lines = list[tuple[int, str]]
@@ -52,8 +52,6 @@ class Table:
         The line in the file of every row, counted from 1; of a table in memory its rows, counted from 0.
     head : sequence of (int, str)
         The lines above the rows, with their numbers.
-    block : (rows, columns) array, optional
-        All cells, where they have been read as numbers already.
     notes : tuple of str
         What a person should know of how the table was found.
     sheet : str
@@ -75,7 +73,6 @@ class Table:
     rows: list[str]
     lines: Sequence[int]
     head: Sequence[tuple[int, str]] = ()
-    block: FloatArray | None = None
     notes: tuple[str, ...] = ()
     sheet: str = ""
     number: int = 0
@@ -109,10 +106,7 @@ class Table:
     def taken(self, rows: IndexArray) -> Table:
         """Return the table with only some rows, in that order."""
         positions = rows.tolist()
-        block = None if self.block is None else self.block[rows]
-        return replace(
-            self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions], block=block
-        )
+        return replace(self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions])
 
     def some_rows(self, count: int) -> Table:
         """Return the table with rows at equal distances, about so many."""
@@ -165,8 +159,6 @@ class Table:
         InputError
             When a cell is empty, not a number or not finite, naming its line and column.
         """
-        if self.block is not None and max(columns) < self.block.shape[1]:
-            return [np.ascontiguousarray(self.block[:, column]) for column in columns]
         for rows, converter in self._readings():
             try:
                 block = np.loadtxt(
@@ -288,6 +280,12 @@ def _problem(cell: str) -> str:
         return f"'{cell}' seems to have a thousands separator. Write numbers without one."
     if NUMBER.fullmatch(cell.rstrip(" %")):
         return f"'{cell}' is a percentage. Write plain numbers, and the unit % in the heading."
+    unit = NUMBER.sub("", cell, count=1).strip() if NUMBER.match(cell) else ""
+    if unit[:1].isalpha() and looks_like_unit(unit):
+        return (
+            f"'{cell}' is a number with its unit, which is read where all cells of a column have the same one, and its "
+            "heading has no other. Write plain numbers, and the unit in the heading."
+        )
     if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
         return f"'{cell}' is not a finite number. Fill in the value."
     return f"'{cell}' is not a number. Correct it."

@@ -37,7 +37,9 @@ class Workbook(FileFormat):
 
             warnings.simplefilter("ignore")  # of features such as drop-down lists, which are not read
             book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-            sheets = {page.title: _sheet_rows(page) for page in book.worksheets}
+            for page in book.worksheets:
+                page.reset_dimensions()  # else one stray cell far to the right makes every row that long
+            sheets = {page.title: [line_of(map(_shown, row)) for row in page.iter_rows()] for page in book.worksheets}
             book.close()
         return sheets
 
@@ -77,11 +79,6 @@ class BinaryWorkbook(OpenDocument):
     name = "xlsb"
     kind = "a binary Excel workbook"
     member = "xl/workbook.bin"
-
-
-def _sheet_rows(sheet: Any) -> list[str]:
-    sheet.reset_dimensions()  # else one stray cell far to the right makes every row that long
-    return [line_of([_shown(cell) for cell in row]) for row in sheet.iter_rows()]
 
 
 def _shown(cell: Any) -> Any:
