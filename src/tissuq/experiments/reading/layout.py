@@ -32,8 +32,6 @@ KNOWN_UNITS = 2
 """Units that show that what stands beside them is one as well."""
 WORD = re.compile(r"[^\W\d_]{2}|%")
 """What a line of names or units holds, and a row of numbers does not."""
-OF_NUMBERS = frozenset("0123456789.,;|+-eE \t")
-"""Characters of rows of plain numbers."""
 UNIT_IN_CELL = re.compile(rf"((?:^|[\t;,|])\s*{NUMBER.pattern})\s*([^\W\d_][^\s;,|]*)(?=\s*(?:$|[\t;,|]))")
 """As in ``1.2 kPa``."""
 
@@ -119,8 +117,6 @@ def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
     header = None if layout.names is None else texts[layout.names].strip()
     numeric = [column for column, cell in enumerate(cells(texts[layout.first_row])) if NUMBER.fullmatch(cell)]
     starts, last_row = list[int](), layout.first_row
-    if OF_NUMBERS.issuperset("".join(texts[layout.first_row + 1 :])):
-        return starts
     for position in range(layout.first_row + 1, len(texts)):
         text = texts[position]
         row = cells(text) if WORD.search(text) else []

@@ -49,7 +49,7 @@ FLOATING = 1e-9
 OF_ONE_ROW = {"maximum", "minimum"}
 """Statistics that the last measurement, too, may be."""
 
-MAY_BE_GROUPED = re.compile(r"[.,]\d{3}[.,]\d")
+MAY_BE_GROUPED = re.compile(r"\d[.,]\d{3}[.,]\d")
 WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*(%|[^\W\d_]\S*)")
 """As in ``10 %`` and ``1.2 kPa``."""
 ROWS_OF_LABEL = 5
@@ -120,7 +120,7 @@ def without_summary(table: Table) -> Table:
         return _without_statistics(table)
     if start < max(FEWEST_MEASUREMENTS, len(table.rows) - start):
         return table
-    numbers, beneath, of_numbers = _parted(table.cells(), start)
+    numbers, beneath, of_numbers = _parted(table, start)
     names = [_statistic(row, numbers, of_numbers) for row in beneath]
     has_word = [_has_word(row, of_numbers) for row in beneath]
     if all(name or (is_apart and word) for name, word in zip(names, has_word, strict=True)):
@@ -137,13 +137,11 @@ def _without_statistics(table: Table) -> Table:
     """Return the table without last rows that are statistics of those above, unless a last measurement may be one."""
     earliest = max(FEWEST_MEASUREMENTS, len(table.rows) - MOST_ROWS)
     end = table.taken(np.arange(max(0, len(table.rows) - 3 * MOST_ROWS), len(table.rows)))
-    if earliest >= len(table.rows) or not _jumps(*_parted(end.cells(), len(end.rows) - (len(table.rows) - earliest))):
+    if earliest >= len(table.rows) or not _jumps(*_parted(end, len(end.rows) - (len(table.rows) - earliest))):
         return table
-    cells = table.cells()
-    numbers, _, _ = _parted(cells, len(cells))
-    for start in range(earliest, len(cells)):
-        of_numbers = np.asarray(np.isfinite(numbers[:start]).all(axis=0))
-        names = [_statistic(row, numbers[:start], of_numbers) for row in cells[start:]]
+    for start in range(earliest, len(table.rows)):
+        numbers, beneath, of_numbers = _parted(table, start)
+        names = [_statistic(row, numbers, of_numbers) for row in beneath]
         if all(names) and not OF_ONE_ROW.issuperset(names):
             return _without_rows(table, start, names)
     return table
@@ -163,8 +161,9 @@ def _place(table: Table, start: int) -> str:
     return f"{table.counted} {top}" if top == bottom else f"{table.counted}s {top} to {bottom}"
 
 
-def _parted(cells: Sequence[Sequence[str]], start: int) -> tuple[FloatArray, Sequence[Sequence[str]], BoolArray]:
+def _parted(table: Table, start: int) -> tuple[FloatArray, list[tuple[str, ...]], BoolArray]:
     """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
+    cells = table.cells()
     numbers = np.array([[number_in(cell) for cell in row] for row in cells[:start]])
     return numbers, cells[start:], np.isfinite(numbers).all(axis=0)
 
@@ -236,8 +235,6 @@ def _without_thousands(table: Table) -> Table:
 
     Numbers with both marks, such as ``1,016.9``, tell which mark they are.
     """
-    if not MAY_BE_GROUPED.search("\n".join(table.rows)):
-        return table
     lines_of_cells = {
         cell: line
         for line, row in reversed(list(zip(table.lines, table.rows, strict=True)))

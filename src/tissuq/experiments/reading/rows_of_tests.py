@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, combinations, pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -26,8 +26,6 @@ RESTART, RETURN = 0.1, 0.5
 """Share of the range of stretches within which all tests begin, and of the longest way that all go."""
 SAMPLED_ROWS = 500
 """Rows in which a column of measured values shows as such."""
-LONG_TABLE = 10_000
-"""Rows from which a table of numbers alone is of one test, unless a name says that a column is of specimens."""
 NOT_OF_TESTS = re.compile(r"step|schritt|segment|phase|block|stage|loop|temp|rate|speed|geschwind|humid|feucht")
 """Names of columns of numbers that part a test of one specimen."""
 SPECIMENS_OF_POPULATION = 3
@@ -178,10 +176,9 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
         axial = stretches[0] if len(choices) == 1 and stretches else axial
         used |= {*stretches, *(column for column in range(len(table.names)) if table.unit(column))}
     samples = list(zip(*table.some_rows(SAMPLED_ROWS).cells(), strict=True))
-    are_numbers = len(table.rows) >= LONG_TABLE and all(map(NUMBER.fullmatch, chain.from_iterable(samples)))
     for column in sorted(set(range(len(table.names))) - used):
         quantity = table.quantities[column]
-        if quantity in CYCLE_NAMES | SET_NAMES or (are_numbers and not is_of_specimens(quantity)):
+        if quantity in CYCLE_NAMES | SET_NAMES or (table.block is not None and not is_of_specimens(quantity)):
             continue
         sample = samples[column]
         if len(set(sample)) > len(sample) / 2:

@@ -52,6 +52,8 @@ class Table:
         The line in the file of every row, counted from 1; of a table in memory its rows, counted from 0.
     head : sequence of (int, str)
         The lines above the rows, with their numbers.
+    block : (rows, columns) array, optional
+        All cells, where they have been read as numbers already.
     notes : tuple of str
         What a person should know of how the table was found.
     sheet : str
@@ -73,6 +75,7 @@ class Table:
     rows: list[str]
     lines: Sequence[int]
     head: Sequence[tuple[int, str]] = ()
+    block: FloatArray | None = None
     notes: tuple[str, ...] = ()
     sheet: str = ""
     number: int = 0
@@ -106,7 +109,10 @@ class Table:
     def taken(self, rows: IndexArray) -> Table:
         """Return the table with only some rows, in that order."""
         positions = rows.tolist()
-        return replace(self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions])
+        block = None if self.block is None else self.block[rows]
+        return replace(
+            self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions], block=block
+        )
 
     def some_rows(self, count: int) -> Table:
         """Return the table with rows at equal distances, about so many."""
@@ -159,6 +165,8 @@ class Table:
         InputError
             When a cell is empty, not a number or not finite, naming its line and column.
         """
+        if self.block is not None and max(columns) < self.block.shape[1]:
+            return [np.ascontiguousarray(self.block[:, column]) for column in columns]
         for rows, converter in self._readings():
             try:
                 block = np.loadtxt(

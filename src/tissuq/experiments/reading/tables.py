@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from io import StringIO
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.arrangement import (
@@ -21,7 +24,7 @@ from tissuq.experiments.reading.arrangement import (
     transposed_table,
     with_names_above,
 )
-from tissuq.experiments.reading.data_frame import columns_of, is_data_frame, kind_of, lines_of
+from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.layout import (
     WHITESPACE,
@@ -36,6 +39,10 @@ from tissuq.experiments.reading.plain_tables import with_plain_numbers, without_
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
 
+LONG_FILE = 10_000
+"""Lines from which a file is first tried on a fast parser."""
+HEAD_LINES = 1000
+"""Lines of a long file that show its layout."""
 SHORT = 500
 """Lines up to which a sheet or another table may hold the sizes of specimens."""
 ALL_TESTS = "tissuq.read_tests and tissuq fit read all of them."
@@ -125,7 +132,9 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
         return tuple(tables)
     if sheet is not None:
         raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
-    return tuple(_read_every_line(path, read_lines(path), skip_rows))
+    lines = read_lines(path)
+    long = _read_long(path, lines, skip_rows)
+    return tuple(_read_every_line(path, lines, skip_rows)) if long is None else (long,)
 
 
 def _of_data_frame(data: Any) -> Table:
@@ -143,7 +152,53 @@ def _of_data_frame(data: Any) -> Table:
     )
     if is_units_row(first_row := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
         table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first_row))
+    if len(rows) >= LONG_FILE and (block := _block(columns)) is not None:
+        return replace(table, block=block)
     return without_summary(with_plain_numbers(table))
+
+
+def _block(columns: Sequence[DataColumn]) -> FloatArray | None:
+    """Return all cells of columns, where they are finite numbers."""
+    try:
+        block = np.column_stack([column.cells.astype(np.float64) for column in columns])
+    except (TypeError, ValueError):
+        return None
+    return block if np.isfinite(block).all() else None
+
+
+def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
+    """Return the table of a long and regular file, whose cells a fast parser takes; None for any other.
+
+    The layout is found in the first lines, and all below the first row must be numbers in as many columns.
+    """
+    if len(lines) < LONG_FILE:
+        return None
+    try:
+        head, *later_tables = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
+    except InputError:
+        return None
+    if later_tables:
+        return None
+    rows = lines[head.lines[0] - 1 :]
+    while rows and not rows[-1].strip():
+        rows.pop()
+    text = "\n".join(rows)
+    if "#" in text or '"' in text:
+        return None
+    import pandas as pd
+
+    separator = r"\s+" if head.separator == WHITESPACE else head.separator
+    try:
+        table = pd.read_csv(
+            StringIO(text), sep=separator, header=None, dtype=np.float64, skip_blank_lines=False, na_filter=False
+        )
+    except (ValueError, pd.errors.ParserError):
+        return None
+    block = table.to_numpy()
+    if block.shape != (len(rows), len(head.names)) or not np.isfinite(block).all():
+        return None
+    numbers = range(head.lines[0], head.lines[0] + len(rows))
+    return replace(head, rows=rows, lines=numbers, block=block)
 
 
 def _read_every_line(
