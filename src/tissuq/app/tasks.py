@@ -103,7 +103,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
 
     say("step", "reading")
     values, readings, name = _measured(request)
-    options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand"))
+    options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand", "stable_in"))
     settings = _settings(LawSettings, values | options)
     study = run_laws(settings, Path(), lambda text: say("step", text), found=readings)
     folder_name = f"{name}-laws"
