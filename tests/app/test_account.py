@@ -65,6 +65,14 @@ def test_columns_are_said_of_the_file_that_has_them_and_the_other_is_read_by_its
     assert highest[1] == pytest.approx(2 * highest[0], rel=1e-3)
 
 
+def test_a_stress_whose_type_is_open_is_asked_about_without_the_name_of_an_option(here, write_stretches):
+    write_stretches(here, heading="stretch,sigma [kPa]")
+    error = account(["kidney.csv"], {}, ["uniaxial"])["error"]
+    assert "Say which type it is: engineering, cauchy" in error["plain"]
+    assert "_type" not in error["plain"]
+    assert error["answers"][1]["label"] == "it is cauchy stress"
+
+
 def test_a_strip_along_axis_2_of_the_tissue_is_a_mode_to_choose(here, write_stretches):
     write_stretches(here)
     (question,) = account(["kidney.csv"], {}, [None])["questions"]
