@@ -285,8 +285,11 @@ def test_a_bad_file_shows_one_message_and_goes_when_it_is_removed(visit, tmp_pat
     (tmp_path / "empty.csv").write_text("")
     page.set_input_files("#pick", tmp_path / "empty.csv")
     sync_api.expect(page.locator("#alert")).to_contain_text("'empty.csv' is empty")
-    upload(page, write_stretches(tmp_path))
+    upload(page, write_stretches(tmp_path, "pig's.csv"))
     assert page.is_visible("#fit-button")
+    said = "Your file 'pig's.csv' is called so here; to repeat the commands of this page give it this name."
+    assert page.inner_text("#file-list").splitlines()[0] == "pig_s.csv"
+    assert said in page.inner_text("#file-list")
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@ import { alertOf, button, byId, fill, make, onPage, options, request } from "./d
 import { showFound } from "./reading.js";
 import { reportOf, showAnswer, showCards, showLaws, showPrediction } from "./results.js";
 
-const state = { session: "", files: [], reading: {}, modes: {}, found: null, settled: new Set(), answer: null, fitted: null };
+const state = { session: "", files: [], renamed: {}, reading: {}, modes: {}, found: null, settled: new Set(), answer: null, fitted: null };
 const listeners = new Map(), early = new Map(), MAX_NAME = 200;
 const own = path => `sessions/${state.session}/${path}`;
 const result = path => own(`results/${path.split("/").map(encodeURIComponent).join("/")}`), zip = path => own(`zip/${path.split("/").map(encodeURIComponent).join("/")}`);
@@ -109,7 +109,8 @@ const showFiles = () => fill(byId("file-list"), ...state.files.map(file => {
   select.value = state.modes[file] ?? "";
   select.addEventListener("change", () => { state.modes[file] = select.value; inspect(); });
   const remove = safely(async () => { state.files = (await request(own(`files/${encodeURIComponent(file)}`), { method: "DELETE" })).files; delete state.modes[file]; inspect(); });
-  return make("li", {}, make("span", { className: "name", textContent: file }), select, button("Remove", remove, { className: "small", aria: { label: `Remove ${file}` } }));
+  return make("li", {}, make("span", { className: "name", textContent: file }), select, button("Remove", remove, { className: "small", aria: { label: `Remove ${file}` } }),
+    state.renamed[file] ? make("p", { className: "soft", textContent: `Your file '${state.renamed[file]}' is called so here; to repeat the commands of this page give it this name.` }) : null);
 }));
 
 const upload = safely(async files => {
@@ -119,7 +120,9 @@ const upload = safely(async files => {
   for (const file of files) {
     if (file.size > state.limit.bytes) { problems.push(`'${file.name}' is too large for this page (${state.limit.words} at most). Take fewer rows, or use the command line, which has no limit: tissuq fit '${file.name}'.`); continue; }
     try {
-      state.files = (await request(own(`files?name=${encodeURIComponent(file.name.slice(-MAX_NAME))}`), { method: "POST", body: file })).files;
+      const { name, files: all } = await request(own(`files?name=${encodeURIComponent(file.name.slice(-MAX_NAME))}`), { method: "POST", body: file });
+      state.files = all;
+      state.renamed[name] = name === file.name.normalize("NFC") ? "" : file.name;
     } catch (error) { problems.push(error.message); }
   }
   await inspect();
