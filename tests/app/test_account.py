@@ -47,6 +47,32 @@ def test_an_unstated_unit_and_mode_are_questions_and_their_answers_settle_them(h
     assert (planar["tests"][0]["mode"], planar["questions"]) == ("planar", [])
 
 
+def test_columns_are_said_of_the_file_that_has_them_and_the_other_is_read_by_itself(here, write_stretches):
+    write_stretches(here)
+    write_stretches(here, "odd.csv", heading="alpha,beta [kPa]", c10=10.0)
+    files, modes, reading = ["kidney.csv", "odd.csv"], ["uniaxial"] * 2, {}
+    for label in ("stretch is in column 'alpha'", "stress is in column 'beta [kPa]'"):
+        error = account(files, reading, modes)["error"]
+        if error is None:
+            break
+        answers = {answer["label"]: answer for answer in error["answers"]}
+        assert error["file"] == "odd.csv"
+        reading |= answers[label]["settings"]
+    found = account(files, reading, modes)
+    assert found["error"] is None
+    assert [test["control"] for test in found["tests"]] == ["stretch", "stretch"]
+    highest = [max(test["curves"][0]["used"]["y"]) for test in found["tests"]]
+    assert highest[1] == pytest.approx(2 * highest[0], rel=1e-3)
+
+
+def test_a_stress_whose_type_is_open_is_asked_about_without_the_name_of_an_option(here, write_stretches):
+    write_stretches(here, heading="stretch,sigma [kPa]")
+    error = account(["kidney.csv"], {}, ["uniaxial"])["error"]
+    assert "Say which type it is: engineering, cauchy" in error["plain"]
+    assert "_type" not in error["plain"]
+    assert error["answers"][1]["label"] == "it is cauchy stress"
+
+
 def test_a_strip_along_axis_2_of_the_tissue_is_a_mode_to_choose(here, write_stretches):
     write_stretches(here)
     (question,) = account(["kidney.csv"], {}, [None])["questions"]

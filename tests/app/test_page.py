@@ -236,11 +236,22 @@ def test_from_a_file_to_the_answer_and_all_that_follows(visit, tmp_path, write_s
 def test_what_to_do_next_names_the_controls_of_the_page(visit, tmp_path, write_stretches):
     page = visit()
     upload(page, *[write_stretches(tmp_path, f"{c10}.csv", c10=c10) for c10 in (5.0, 6.0)])
+    page.click("#fit-form summary")
+    assert (
+        sum(
+            text.startswith("auto:") or text == "auto" for text in page.locator("#discrepancy option").all_inner_texts()
+        )
+        == 1
+    )
+    page.fill("#noise", "0,1")
+    page.click("#fit-button")
+    sync_api.expect(page.locator("#alert")).to_contain_text("a positive number with a decimal point")
+    page.fill("#noise", "")
     fit(page, until="#answer-body .numbers")
+    assert not page.inner_text("#alert")
     advice = page.inner_text("#answer-body")
     assert "fit again with “All tests are of one specimen”" in advice
     assert "--" not in advice
-    page.click("#fit-form summary")
     page.check("#one-specimen")
     page.wait_for_selector("#stale", state="visible")
     fit(page, until="text=for this specimen")
@@ -249,6 +260,7 @@ def test_what_to_do_next_names_the_controls_of_the_page(visit, tmp_path, write_s
         "fit again with --discrepancy auto.", "fit again with --stable-in all.", "fit again with --until-peak.",
         "count from where load begins: fit again with --preload auto.", "fit again with --material all.",
         "tissuq design runs/a says which.", "or with --noise autoregressive.",
+        "give --at, and also --at2.", "--at has 3 values and --at2 4", "--format table is exact.",
     ])  # fmt: skip
     assert written == [
         "fit again with “What the material cannot explain”: auto.",
@@ -256,6 +268,8 @@ def test_what_to_do_next_names_the_controls_of_the_page(visit, tmp_path, write_s
         "fit again with “Leave out what follows the largest stress”.",
         "count from where load begins: fit again with “Taut (stretch 1) from”: auto.",
         "fit again with “Compare laws”, below.", "tissuq design runs/a says which.", "or with --noise autoregressive.",
+        "give “Stretches”, and also “Of the second axis”.", "“Stretches” has 3 values and “Of the second axis” 4",
+        "“Code”: table is exact.",
     ]  # fmt: skip
 
 
@@ -271,8 +285,11 @@ def test_a_bad_file_shows_one_message_and_goes_when_it_is_removed(visit, tmp_pat
     (tmp_path / "empty.csv").write_text("")
     page.set_input_files("#pick", tmp_path / "empty.csv")
     sync_api.expect(page.locator("#alert")).to_contain_text("'empty.csv' is empty")
-    upload(page, write_stretches(tmp_path))
+    upload(page, write_stretches(tmp_path, "pig's.csv"))
     assert page.is_visible("#fit-button")
+    said = "Your file 'pig's.csv' is called so here; to repeat the commands of this page give it this name."
+    assert page.inner_text("#file-list").splitlines()[0] == "pig_s.csv"
+    assert said in page.inner_text("#file-list")
 
 
 @pytest.mark.slow

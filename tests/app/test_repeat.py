@@ -150,7 +150,8 @@ def test_laws_predictions_and_cards_are_repeated(here, write_stretches, monkeypa
     measured = {"files": ["kidney.csv"], "modes": ["uniaxial"], "discrepancies": ["none"]}
     run = done("fit", measured)["done"]["run"]
 
-    shown = done("laws", measured | {"laws": ["neo-hookean", "yeoh"]})["done"]
+    shown = done("laws", measured | {"laws": ["neo-hookean", "yeoh"], "stable_in": ["all"]})["done"]
+    assert "--stable-in all" in shown["repeat"]["shell"]
     table = executed(shown["repeat"]["python"])["comparison"].table
     assert [row[0] for row in shown["rows"]] == list(table.index)
     moduli = [float(row[1]) for row in shown["rows"]]

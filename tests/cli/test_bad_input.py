@@ -93,7 +93,7 @@ PAPER = [
     (["--measurements", "12.5"], ["--measurements", "integer"]),
     (["--stretch-range", "0.5"], ["--stretch-range", "LOW:HIGH", "'0.5'"]),
     (["--stretch-range", "low:high"], ["--stretch-range", "LOW:HIGH"]),
-    (["--stretch-range", "2:1"], ["stretch_low 2", "stretch_high 1"]),
+    (["--stretch-range", "2:1"], ["the smallest stretch, 2", "the largest, 1 (--stretch-range)"]),
     (["--stretch-range", "0:2"], ["stretch_low", "greater than 0"]),
     (["--stretch-range", "nan:2"], ["stretch_low", "nan"]),
     (["--stretch-range", "0.5:inf"], ["stretch_high", "finite", "inf"]),

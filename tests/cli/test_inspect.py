@@ -184,13 +184,40 @@ def liver_file(folder):
     (folder / "liver.txt").write_text("\n".join(lines) + "\n")
 
 
+def test_columns_that_one_of_several_files_has_are_those_of_that_file(cli, here):
+    (here / "plain.csv").write_text("stretch,stress [kPa]\n" + "".join(f"{1 + k / 20},{k}\n" for k in range(6)))
+    (here / "odd.csv").write_text("alpha,beta [kPa]\n" + "".join(f"{1 + k / 20},{3 * k}\n" for k in range(6)))
+    columns = ["--column", "stretch=alpha", "--column", "stress=beta [kPa]"]
+    said = cli("inspect", "plain.csv", "odd.csv", "--mode", "uniaxial", *columns, "--write", "study.toml")
+    assert "plain: uniaxial (as given), 6 rows, stretch 1 to 1.25, stress 0 to 5 kPa" in said.out
+    assert "odd: uniaxial (as given), 6 rows, stretch 1 to 1.25, stress 0 to 15 kPa" in said.out
+    tests = tomllib.loads((here / "study.toml").read_text())["tests"]
+    assert [test.get("columns") for test in tests] == [None, {"stretch": "alpha", "stress": "beta [kPa]"}]
+    said = cli("inspect", "plain.csv", "odd.csv", "--column", "stretch=gamma")
+    assert (said.status, said.out) == (2, "")
+    assert "plain.csv has no column 'gamma'" in said.err
+
+
+def test_a_study_is_not_taken_for_a_file_of_measurements(cli, here):
+    (here / "study.toml").write_text("material = 'yeoh'\n")
+    said = cli("inspect", "study.toml")
+    assert said.status == 2
+    assert "if it is a study, give it alone: tissuq fit study.toml." in said.err
+
+
+def test_what_a_shear_test_is_along_is_an_amount_of_shear(cli):
+    said = cli("inspect", "brain-cortex-shear")
+    assert "\nshear     0 to 0.2\n" in said.out
+    assert "stretch" not in said.out
+
+
 @pytest.mark.slow
 def test_a_study_of_all_tests_in_a_file_is_written_and_fitted(cli, here):
     liver_file(here)
     said = cli("inspect", "liver.txt", "--write", "study.toml")
     assert said.status == 0
     assert "test 1    tension: uniaxial ('tension'), 12 rows, stretch 1 to 1.3" in said.out
-    assert "test 2    shear: simple-shear ('shear'), 12 rows, stretch 0 to 0.3, stress 0 to 12 kPa" in said.out
+    assert "test 2    shear: simple-shear ('shear'), 12 rows, amount of shear 0 to 0.3, stress 0 to 12 kPa" in said.out
     assert cli("inspect", "liver.txt", "--write", "study.toml").status == 2
     study = here / "study.toml"
     assert [test["table"] for test in tomllib.loads(study.read_text())["tests"]] == [1, 2]

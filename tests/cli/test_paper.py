@@ -120,6 +120,14 @@ def test_the_table_in_the_terminal_fits_80_columns_and_says_where_the_report_lie
     assert "Report: run/report.html" in said.out
 
 
+def test_the_page_says_with_which_priors_the_claims_are_confirmed_whatever_those_of_the_run(paper_run):
+    folder, _ = paper_run
+    sections = json.loads((folder / "result.json").read_text(encoding="utf-8"))["sections"]
+    question = json.dumps(next(section for section in sections if section["title"] == "The question"))
+    assert "with the defaults of this study: 30 points on [0.5, 4.25]" in question
+    assert "c on [0, 1] MPa" in question
+
+
 def test_show_prints_the_study(cli, paper_run):
     folder, said = paper_run
     shown = cli("show", folder)

@@ -39,7 +39,8 @@ def test_a_file_may_hold_more_than_the_command_line_says():
     properties = schema_of("paper")["properties"]
     assert {"truth", "stretch_low"} <= set(properties)
     assert properties["points"]["option"] == "--measurements"
-    assert "option" not in properties["truth"]
+    assert properties["truth"]["option"] == "--true-value"
+    assert "option" not in properties["stretch_low"]
     assert schema_of("coverage")["required"] == ["designs"]
 
 

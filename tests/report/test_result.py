@@ -160,6 +160,18 @@ def test_the_record_of_a_folder_is_that_of_the_result(tmp_path):
     assert read_record(tmp_path) == json.loads(json.dumps(result.record()))
 
 
+def test_a_folder_without_a_record_says_what_it_holds_instead(tmp_path):
+    for name in ("liver", "my kidney"):
+        (tmp_path / "runs" / name).mkdir(parents=True)
+        write_result(result_of(), tmp_path / "runs" / name, figures=False)
+    with pytest.raises(InputError, match=r"Runs in it: \S*/runs/liver, '.*/runs/my kidney'\."):
+        read_record(tmp_path / "runs")
+    for name in ("run.toml", "tasks.jsonl"):
+        (tmp_path / name).write_text("")
+    with pytest.raises(InputError, match=r"It was stopped: the command that began it, with --out .*, goes on"):
+        read_record(tmp_path)
+
+
 @pytest.mark.parametrize("content", ["", "[]", "{}", "null", '{"title": 1}', "[" * 100_000, "9" * 5000])
 def test_a_damaged_record_is_one_message(tmp_path, content):
     (tmp_path / "result.json").write_text(content)

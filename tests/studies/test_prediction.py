@@ -262,8 +262,8 @@ def test_other_texts_are_refused(text):
     ("mode", "stretch", "stretch2", "words"),
     [
         ("planar", "1:2", "1", "has one control"),
-        ("biaxial", "1:2", None, "both --at and --at2"),
-        ("biaxial", None, "1:2", "both --at and --at2"),
+        ("biaxial", "1:2", None, "give --at, and also --at2"),
+        ("biaxial", None, "1:2", "give --at, and also --at2"),
         ("biaxial", "1,2,3", "1,2", "3 values and --at2 2"),
     ],
 )

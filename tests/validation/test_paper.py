@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import comb
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -111,10 +112,11 @@ def test_a_check_fails_only_where_chance_would_be_too_rare():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"stretch_low": 3.0, "stretch_high": 2.0}, "less than stretch_high"),
+        ({"stretch_low": 3.0, "stretch_high": 2.0}, "3, must be less than the largest, 2 .--stretch-range"),
         ({"noise_sd": 0.0}, "greater than 0"),
         ({"points": 2}, "greater than or equal to 6"),
-        ({"truth": {"C10": 1.0}}, "truth needs exactly"),
+        ({"truth": {"C40": 1.0}}, "no parameter C40; it has C10, C20, C30"),
+        ({"truth": {"C10": np.inf}}, "finite number"),
         ({"priors": {"mu": {"low": 0, "high": 1}}}, "no parameter is named mu"),
         ({"priors": {"C10": {"distribution": "uniform", "low": 0}}}, "needs low and high"),
         ({"sampler": "gibbs"}, "exact"),
@@ -124,6 +126,14 @@ def test_a_check_fails_only_where_chance_would_be_too_rare():
 def test_bad_settings_are_refused(changes, words):
     with pytest.raises(ValidationError, match=words):
         PaperSettings(**changes)
+
+
+def test_a_true_parameter_given_alone_keeps_the_others():
+    settings = PaperSettings(truth={"C10": 0.6}, points=10)
+    assert settings.truth == {"C10": 0.6, "C20": -0.057, "C30": 0.004}
+    experiments = settings.experiment(), PaperSettings(points=10).experiment()
+    difference = np.subtract(*(experiment.stress for experiment in experiments))
+    np.testing.assert_allclose(difference, 2 * (0.6 - 1.2) * (settings.stretch - settings.stretch**-2), atol=1e-12)
 
 
 def test_a_prior_given_alone_keeps_the_others():

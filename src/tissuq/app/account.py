@@ -17,7 +17,7 @@ from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import stress_unit
 from tissuq.studies.answers import Answer, answers_in, with_options
-from tissuq.studies.files_of_tests import find_tests, tables_of, tests_in_words
+from tissuq.studies.files_of_tests import find_tests, reading_of, tables_of, tests_in_words
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -69,10 +69,10 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path, mode in zip(paths, modes, strict=True):
         try:
-            tests += find_tests(path, {**reading, "mode": mode}, is_only_file=len(files) == 1)
+            tests += find_tests(path, reading_of(path, paths, reading) | {"mode": mode}, is_only_file=len(files) == 1)
         except TissuqError as refusal:
             settings, start = {**reading, "mode": mode}, perf_counter()
-            doubt = _question(path, str(refusal), columns, settings, len(files), start, refused=True)
+            doubt = _question(path, str(refusal), columns, settings, paths, start, refused=True)
             record["error"] = doubt | {"file": str(path)}
             break
     start = perf_counter()
@@ -88,7 +88,7 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
             path, mode = Path(settings["file"]), stated.get(str(settings["file"]))
             for text in of_test.doubts:
                 if text not in [question["text"] for question in record["questions"]]:
-                    doubt = _question(path, text, columns, {**reading, "mode": mode}, len(files), start)
+                    doubt = _question(path, text, columns, {**reading, "mode": mode}, paths, start)
                     record["questions"] += [doubt | {"file": str(path)}] if doubt["answers"] else []
         silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
         if silent:
@@ -129,6 +129,7 @@ def _test(settings: Mapping[str, Any], inspection: Inspection) -> dict[str, Any]
         "name": experiment.name,
         "file": str(settings["file"]),
         "mode": experiment.mode.name,
+        "control": inspection.control,
         "mode_source": reading.mode_source,
         "is_mode_assumed": reading.mode_source == DEFAULT_SOURCE,
         "unit": experiment.stress_unit,
@@ -186,7 +187,7 @@ def _question(
     text: str,
     columns: Sequence[str],
     settings: Mapping[str, Any],
-    count: int,
+    files: Sequence[Path],
     start: float,
     *,
     refused: bool = False,
@@ -202,7 +203,8 @@ def _question(
             continue
         if perf_counter() - start < SECONDS_TO_TRY:
             try:
-                tests = find_tests(file, with_options(settings, proposal), is_only_file=count == 1)
+                options = reading_of(file, files, with_options(settings, proposal))
+                tests = find_tests(file, options, is_only_file=len(files) == 1)
                 answer["gives"] = tests_in_words(tests)
             except TissuqError as refusal:
                 if str(refusal) == text or not refused:

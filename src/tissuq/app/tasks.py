@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from tissuq.app.repeat import command, fit_lines, reading_words
 from tissuq.errors import InputError
-from tissuq.studies.files_of_tests import measured, run_name
+from tissuq.studies.files_of_tests import measured, reading_of, run_name
 from tissuq.studies.option_texts import column
 
 if TYPE_CHECKING:
@@ -56,9 +56,11 @@ def inspect(request: Mapping[str, Any], say: Say) -> None:
 
     files, modes, reading = _files(request)
     record = account(files, reading, [mode or None for mode in modes or [""] * len(files)])
-    options = f", {', '.join(f'{name}={value!r}' for name, value in reading.items())}" if reading else ""
-    of_files = [f", mode={mode!r}" if mode else "" for mode in modes or [""] * len(files)]
-    prints = [f"print(tq.inspect({file!r}{options}{mode}))" for file, mode in zip(files, of_files, strict=True)]
+    paths, prints = list(map(Path, files)), []
+    for file, mode in zip(files, modes or [""] * len(files), strict=True):
+        options = reading_of(Path(file), paths, reading) | {"mode": mode}
+        words = [repr(file), *(f"{name}={value!r}" for name, value in options.items() if value)]
+        prints.append(f"print(tq.inspect({', '.join(words)}))")
     lines = "\n".join(["import tissuq as tq", "", *prints])
     say("done", record | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
 
@@ -103,7 +105,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
 
     say("step", "reading")
     values, readings, name = _measured(request)
-    options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand"))
+    options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand", "stable_in"))
     settings = _settings(LawSettings, values | options)
     study = run_laws(settings, Path(), lambda text: say("step", text), found=readings)
     folder_name = f"{name}-laws"

@@ -11,7 +11,7 @@ from tissuq.cli.command import command
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.numbers import wrapped
 from tissuq.studies.answers import DIMENSIONS, Answer, answers_in, options_in, with_options
-from tissuq.studies.files_of_tests import files_of, find_tests, tables_of, tests_in_words
+from tissuq.studies.files_of_tests import files_of, find_tests, reading_of, tables_of, tests_in_words
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import argument, option
 
@@ -67,7 +67,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
         if ask:
             file_tests, settings = ask_about(path, settings, is_only_file=len(files) == 1)
         else:
-            file_tests = find_tests(path, settings, is_only_file=len(files) == 1)
+            file_tests = find_tests(path, reading_of(path, files, settings), is_only_file=len(files) == 1)
         tests += file_tests
     inspections = [Inspection.of(reading) for _, reading in tests]
     print(inspections[0] if len(tests) == 1 else overview(inspections))

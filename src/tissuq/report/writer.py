@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["contents_for_programs", "data_file", "posterior_files", "read_record", "write_result"]
 
+MAX_RUNS_NAMED = 5
+"""Runs that a message names of a folder that holds several."""
+
 
 def write_result(result: Result, folder: Path, *, figures: bool = True, target: Path | None = None) -> Record:
     """Write a result into a folder, whose earlier figures go; return its record.
@@ -127,9 +130,18 @@ def contents_for_programs(folder: Path) -> dict[str, Any]:
 def _without_record(folder: Path) -> InputError:
     if not folder.exists():
         return InputError(f"there is no folder '{folder}'.")
-    recipe = folder / RECIPE
-    again = f" If an earlier version made it, make it again, as the first line of '{recipe}' says." * recipe.is_file()
-    return InputError(f"'{folder}' is not the folder of a complete run: {RESULT} is missing.{again}")
+    from tissuq.studies.stream import RESULTS
+
+    recipe, runs = folder / RECIPE, sorted(folder.glob(f"*/{RESULT}"))
+    further = ""
+    if (folder / RESULTS).is_file():
+        further = f" It was stopped: the command that began it, with --out {shlex.quote(str(folder))}, goes on."
+    elif recipe.is_file():
+        further = f" If an earlier version made it, make it again, as the first line of '{recipe}' says."
+    elif runs:
+        names = ", ".join(shlex.quote(str(path.parent)) for path in runs[:MAX_RUNS_NAMED])
+        further = f" Runs in it: {names}{' and others' if len(runs) > MAX_RUNS_NAMED else ''}."
+    return InputError(f"'{folder}' is not the folder of a complete run: {RESULT} is missing.{further}")
 
 
 def data_file(experiment: Experiment, unit: StressUnit | None = None) -> dict[str, Any]:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, FiniteFloat
 
 from tissuq.parameters.checks import MAX_SEED
 from tissuq.studies.option import Settings, argument, option, seed
-from tissuq.studies.option_texts import priors, tolerances
+from tissuq.studies.option_texts import pairs_of, priors, tolerances
 from tissuq.studies.settings import SizesOfErrors, imported
 
 NoiseKnown = Annotated[
@@ -46,7 +46,7 @@ class PaperOptions(Settings):
     points: int = option(30, "Number of measurements.", name="measurements", ge=6, le=10_000)
     noise_sd: float = option(
         0.5,
-        "Standard deviation of the noise, MPa [0.5]; 0.7071 if 0.5 is a variance.",
+        "Standard deviation of the noise, MPa [0.5]. If the paper's 0.5 is a variance, this is 0.7071.",
         unit="MPa",
         gt=0,
         allow_inf_nan=False,
@@ -56,6 +56,13 @@ class PaperOptions(Settings):
         default_factory=dict,
         name="prior",
         parse=priors,
+        validate_default=True,
+    )
+    truth: dict[str, FiniteFloat] = option(
+        help="A parameter of the measured Yeoh material, MPa [C10=1.2, C20=-0.057, C30=0.004]; repeat for more.",
+        default_factory=dict,
+        name="true-value",
+        parse=pairs_of("--true-value", "a parameter of the Yeoh material", "NAME=VALUE, as in C10=0.6"),
         validate_default=True,
     )
     seed: int = option(2021, "Seed of noise and draws.", ge=0, le=MAX_SEED)

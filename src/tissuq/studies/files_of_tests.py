@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,6 +56,8 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
 
     files: list[Path] = []
     for path in paths:
+        if path.suffix == ".toml":
+            raise InputError(f"'{path}' holds no measurements; if it is a study, give it alone: tissuq fit {path}.")
         if not path.is_dir():
             files.append(resolve(path))
             continue
@@ -90,8 +94,9 @@ def measured(
         return reading | {"noise_sd": noise[0] if noise else None}, []
     held = _for_each([1] * len(files), "--axial-stretch", axial_stretches or [reading.get("axial_stretch")])
     of_files = [
-        find_tests(file, reading | {"mode": mode, "axial_stretch": stretch}, is_only_file=len(files) == 1)
+        find_tests(file, options | {"mode": mode, "axial_stretch": stretch}, is_only_file=len(files) == 1)
         for file, mode, stretch in zip(files, _modes(files, modes), held, strict=True)
+        for options in [reading_of(file, files, reading)]
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
     readings = [of_test for of_file in of_files for _, of_test in of_file]
@@ -119,6 +124,26 @@ def measured(
     pairs = zip(tests, readings, strict=True)
     as_found = [of_test if of_test.experiment.mode.name == test["mode"] else None for test, of_test in pairs]
     return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}, as_found
+
+
+def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options that read one of several files: without columns that others have, and it has not."""
+    from tissuq.experiments.reading.recognition import find_column
+
+    def has(path: Path, role: str, name: str | int) -> bool:
+        for table in tables(path):
+            with suppress(InputError):
+                find_column(table, role, name)
+                return True
+        return False
+
+    tables = cache(lambda path: tables_of(path, reading))
+    columns = dict(reading.get("columns") or {})
+    if len(files) > 1:
+        for role, name in list(columns.items()):
+            if not has(file, role, name) and any(has(other, role, name) for other in files):
+                del columns[role]
+    return {**reading, "columns": columns or None}
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

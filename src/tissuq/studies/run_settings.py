@@ -117,7 +117,7 @@ class PredictionSettings(RunSettings):
             return None if self.stretch is None else stretches(self.stretch, self.points)
         if self.stretch is None or self.stretch2 is None:
             names = " and ".join(control.name for control in controls)
-            raise InputError(f"mode '{mode}' has two controls, {names}: give both --at and --at2.")
+            raise InputError(f"mode '{mode}' has two controls, {names}: give --at, and also --at2.")
         axis1 = stretches(self.stretch, self.points)
         axis2 = stretches(self.stretch2, len(axis1))
         if len(axis1) == 1 or len(axis2) == 1:

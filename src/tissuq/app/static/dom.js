@@ -69,9 +69,10 @@ export const tableOf = (headers, rows, caption) => make("div", { className: "scr
 
 // Where the page says what an option of the shell says: the control of each, whose label names it.
 const CONTROLS = { material: "material", discrepancy: "discrepancy", estimand: "estimand", "noise-sd": "noise", "stable-in": "stable", specimen: "one-specimen",
+  at: "stretch", at2: "stretch2", format: "format",
   ...Object.fromEntries(["preload", "cycle", "branch", "every", "leave-out", "until-peak", "zero", "load-zero", "compliance", "turn", "strain-type", "stress-type", "stress-unit", "strain-unit",
     "incompressible", "axial-stretch"].map(name => [name, name.replaceAll("-", "_")])) };
-const OPTION = /--([a-z]+(?:-[a-z]+)*)(?: ("[^"]*"|'[^']*'|[^\s;,()'"]*[^\s;,.:()'"]))?( once for each)?/g;
+const OPTION = /--([a-z]+(?:-[a-z]+)*\d?)(?: ("[^"]*"|'[^']*'|[^\s;,()'"]*[^\s;,.:()'"]))?( once for each)?/g;
 
 // A message of the answer, with the controls of the page where it names options of the shell.
 export const onPage = text => text.replace(OPTION, (typed, name, value, each) => {
@@ -79,7 +80,7 @@ export const onPage = text => text.replace(OPTION, (typed, name, value, each) =>
   const control = byId(CONTROLS[name]) ?? byId("reading").elements[CONTROLS[name]];
   const label = control?.labels?.[0], words = label && [...label.childNodes].filter(node => node.nodeType === Node.TEXT_NODE).map(node => node.data).join("").trim();
   if (!words || text.includes("tissuq fit") && name === "material") return typed;
-  return control.type === "checkbox" ? `“${words}”${["specimen", "stable-in"].includes(name) || !value ? "" : ` ${value}`}` : `“${words}”${value ? `: ${value}` : ""}${each ?? ""}`;
+  return control.type === "checkbox" ? `“${words}”${["specimen", "stable-in"].includes(name) || !value ? "" : ` ${value}`}` : `“${words}”${value ? `${name.startsWith("at") ? "" : ":"} ${value}` : ""}${each ?? ""}`;
 });
 
 export const warningsOf = warnings => warnings.map(warning => make("p", {

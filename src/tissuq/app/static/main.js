@@ -1,9 +1,9 @@
 // The flow of the page: files, what was understood, fit, answer, and what follows.
-import { alertOf, button, byId, fill, make, options, request } from "./dom.js";
+import { alertOf, button, byId, fill, make, onPage, options, request } from "./dom.js";
 import { showFound } from "./reading.js";
 import { reportOf, showAnswer, showCards, showLaws, showPrediction } from "./results.js";
 
-const state = { session: "", files: [], reading: {}, modes: {}, found: null, settled: new Set(), answer: null, fitted: null };
+const state = { session: "", files: [], renamed: {}, reading: {}, modes: {}, found: null, settled: new Set(), answer: null, fitted: null };
 const listeners = new Map(), early = new Map(), MAX_NAME = 200;
 const own = path => `sessions/${state.session}/${path}`;
 const result = path => own(`results/${path.split("/").map(encodeURIComponent).join("/")}`), zip = path => own(`zip/${path.split("/").map(encodeURIComponent).join("/")}`);
@@ -30,6 +30,7 @@ const stop = number => request(own(`tasks/${number}`), { method: "DELETE" }).cat
 
 // Begins a task whose stages are shown, with a button that stops it.
 const beginShown = async (task, values, place, form, heard) => {
+  alertOf("");
   const stages = make("ol", { className: "stages", aria: { live: "polite" } }), bar = make("progress", { aria: { label: "working" } });
   const submit = form.querySelector("[type=submit]");
   submit.disabled = true;
@@ -42,7 +43,7 @@ const beginShown = async (task, values, place, form, heard) => {
   const news = (kind, data) => {
     if (kind === "start") stages.replaceChildren();
     else if (kind === "step") add(data);
-    else if (kind === "error") end(make("p", { className: "warning problem", role: "alert", textContent: data.text }));
+    else if (kind === "error") end(make("p", { className: "warning problem", role: "alert", textContent: onPage(data.text) }));
     else if (kind === "stopped") end(make("p", { className: "soft", role: "status", textContent: "Stopped. Nothing was kept of it." }));
     else { if (kind === "done") end(); heard(kind, data); }
   };
@@ -108,7 +109,8 @@ const showFiles = () => fill(byId("file-list"), ...state.files.map(file => {
   select.value = state.modes[file] ?? "";
   select.addEventListener("change", () => { state.modes[file] = select.value; inspect(); });
   const remove = safely(async () => { state.files = (await request(own(`files/${encodeURIComponent(file)}`), { method: "DELETE" })).files; delete state.modes[file]; inspect(); });
-  return make("li", {}, make("span", { className: "name", textContent: file }), select, button("Remove", remove, { className: "small", aria: { label: `Remove ${file}` } }));
+  return make("li", {}, make("span", { className: "name", textContent: file }), select, button("Remove", remove, { className: "small", aria: { label: `Remove ${file}` } }),
+    state.renamed[file] ? make("p", { className: "soft", textContent: `Your file '${state.renamed[file]}' is called so here; to repeat the commands of this page give it this name.` }) : null);
 }));
 
 const upload = safely(async files => {
@@ -118,7 +120,9 @@ const upload = safely(async files => {
   for (const file of files) {
     if (file.size > state.limit.bytes) { problems.push(`'${file.name}' is too large for this page (${state.limit.words} at most). Take fewer rows, or use the command line, which has no limit: tissuq fit '${file.name}'.`); continue; }
     try {
-      state.files = (await request(own(`files?name=${encodeURIComponent(file.name.slice(-MAX_NAME))}`), { method: "POST", body: file })).files;
+      const { name, files: all } = await request(own(`files?name=${encodeURIComponent(file.name.slice(-MAX_NAME))}`), { method: "POST", body: file });
+      state.files = all;
+      state.renamed[name] = name === file.name.normalize("NFC") ? "" : file.name;
     } catch (error) { problems.push(error.message); }
   }
   await inspect();
@@ -159,7 +163,7 @@ const compare = safely(async event => {
   event.preventDefault();
   const chosen = [...byId("law-list").querySelectorAll("input:checked")].map(box => box.value), isAll = byId("all-laws").checked;
   if (!isAll && chosen.length < 2) throw new Error("Choose two laws or more, or all of them.");
-  const { material, stable_in, ...others } = fitOptions();
+  const { material, ...others } = fitOptions();
   await beginShown("laws", { ...JSON.parse(state.fitted)[0], ...others, laws: isAll ? ["all"] : chosen }, byId("laws-progress"), byId("laws-form"),
     (kind, data) => { if (kind === "done") showLaws(data, result(data.report), zip(`runs/${data.run}`)); });
 });
@@ -184,7 +188,7 @@ const showChoices = choices => {
   const explain = () => { byId("material-words").textContent = `W = ${choices.materials.find(item => item.name === byId("material").value).words}`; };
   byId("material").addEventListener("change", explain);
   explain();
-  options(byId("discrepancy"), choices.discrepancies.map(item => item.name), "auto: let the data say");
+  options(byId("discrepancy"), choices.discrepancies.map(item => item.name).filter(name => name !== "auto"), "auto: let the data say");
   options(byId("estimand"), choices.estimands.map(item => ({ value: item.name, textContent: `${item.name}: ${item.words}` })), "the specimen; the tissue for several specimens");
   options(byId("mode"), choices.modes.map(mode => ({ value: mode.name, textContent: `${mode.name}: ${mode.words}` })));
   options(byId("format"), choices.formats);

@@ -73,15 +73,16 @@ const fieldOf = ([name, words, kind], reading, change) => {
 };
 
 const columnsOf = (found, reading, change) => {
-  const columns = (found.tables[found.error?.file] ?? Object.values(found.tables).flat())[0]?.columns ?? [];
-  const seen = found.tests[0]?.roles ?? Object.fromEntries(Object.entries(reading.columns ?? {}).map(([role, name]) => [String(name), role]));
+  const file = found.error?.file ?? found.tests[0]?.file, columns = found.tables[file]?.[0]?.columns ?? [];
+  const is_here = ([, name]) => columns.some(column => column.name === String(name)), said = Object.entries(reading.columns ?? {});
+  const seen = found.tests.find(test => test.file === file)?.roles ?? Object.fromEntries(said.filter(is_here).map(([role, name]) => [String(name), role]));
   const roles = { ...seen };
   const choose = (name, role) => {
     const kinds = [role, ...RIVALS.filter(group => group.includes(role)).flat()];
     for (const other of Object.keys(roles)) if (other !== name && kinds.includes(roles[other])) delete roles[other];
     if (role) roles[name] = role; else delete roles[name];
     const chosen = Object.fromEntries(Object.entries(roles).map(([column, of]) => [of, column]));
-    change(now => ({ ...now, columns: chosen }));
+    change(now => ({ ...now, columns: { ...Object.fromEntries(said.filter(item => !is_here(item))), ...chosen } }));
   };
   return make("fieldset", {}, make("legend", { textContent: "Columns" }), make("div", { className: "columns" }, ...columns.map(column => {
     const select = options(make("select", { name: `column ${column.name}` }), [...new Set([...ROLES, ...Object.values(roles)])].map(role => ({ value: role, textContent: role.replace("_", " ") })), "not read");
@@ -126,7 +127,7 @@ export const showFound = (found, reading, settled, { change, answer, leave }) =>
     return shown;
   }));
   fill(byId("tests"), ...found.tests.map(test => make("div", { className: "test" },
-    make("h3", { textContent: `${test.name}: ${test.mode}${test.is_mode_assumed ? " (assumed)" : ""}, ${test.rows} of ${test.all_rows} rows, stretch ${test.range.map(end => end.toPrecision(4)).join(" to ")}` }),
+    make("h3", { textContent: `${test.name}: ${test.mode}${test.is_mode_assumed ? " (assumed)" : ""}, ${test.rows} of ${test.all_rows} rows, ${test.control} ${test.range.map(end => end.toPrecision(4)).join(" to ")}` }),
     ...test.curves.map(curve => curveOf(curve, test.name, (low, high) => change(now => ({ ...now, stretch_range: [low, high].map(end => Number(end.toPrecision(4))) })))))));
   if (found.tests.length) byId("tests").append(make("p", { className: "soft" }, "Drag over a curve to use only that range of stretches. ",
     reading.stretch_range ? button("Use all stretches", () => change(now => ({ ...now, stretch_range: null })), { className: "small" }) : null));

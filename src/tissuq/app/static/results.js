@@ -14,7 +14,7 @@ export const showAnswer = answer => {
       make("strong", { textContent: `${use.verdict.toUpperCase()}: ` }), use.purpose, make("span", { textContent: use.reason })))),
     make("p", {}, make("strong", { textContent: "Next: " }), onPage(answer.next)),
     ...warningsOf(answer.shown.filter(warning => warning.severity !== "problem")),
-    answer.folded.length ? make("details", {}, make("summary", { textContent: `${answer.folded.length} further warnings and notes` }), ...warningsOf(answer.folded)) : null,
+    answer.folded.length ? make("details", {}, make("summary", { textContent: `Further warnings and notes: ${answer.folded.length}` }), ...warningsOf(answer.folded)) : null,
     repeatOf(answer.repeat));
 };
 
@@ -25,7 +25,7 @@ export const reportOf = (address, title) => make("div", {},
 export const showLaws = (found, address, zip) => fill(byId("laws-result"),
   make("p", { textContent: found.lead }), tableOf(found.headers, found.rows, "Laws"),
   ...Object.entries(found.skipped).map(([name, reason]) => make("p", { className: "soft", textContent: `Not fitted: ${name}: ${reason}` })),
-  found.warnings.length ? make("details", {}, make("summary", { textContent: `${found.warnings.length} warnings and notes` }), ...warningsOf(found.warnings)) : null,
+  found.warnings.length ? make("details", {}, make("summary", { textContent: `Warnings and notes: ${found.warnings.length}` }), ...warningsOf(found.warnings)) : null,
   repeatOf(found.repeat), make("p", {}, make("a", { className: "button", href: zip, textContent: "Download the comparison (zip)" })), reportOf(address, "Report of the comparison"));
 
 export const showPrediction = (found, address, zip) => fill(byId("predict-result"),
@@ -33,7 +33,7 @@ export const showPrediction = (found, address, zip) => fill(byId("predict-result
   make("p", {}, make("a", { className: "button", href: zip, textContent: "Download the prediction (zip)" })), reportOf(address, "Report of the prediction"));
 
 export const showCards = (found, zip) => fill(byId("export-result"),
-  make("ul", {}, ...found.explanations.map(text => make("li", { textContent: text }))),
+  make("ul", {}, ...found.explanations.map(text => make("li", { textContent: onPage(text) }))),
   make("p", {}, make("a", { className: "button", href: zip, textContent: `Download ${found.files.length} cards (zip)` })),
   make("details", {}, make("summary", { textContent: `The first card, ${found.files[0]}` }), make("pre", { textContent: found.example, tabIndex: 0 })),
   repeatOf(found.repeat));

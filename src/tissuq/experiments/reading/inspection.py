@@ -60,10 +60,16 @@ class Inspection:
         experiment = self.reading.experiment
         name = f"{experiment.name}: {experiment.mode.name} ({self.reading.mode_source})"
         spans = "; ".join(
-            f"{f'{label}: ' * bool(label)}stretch {stretch}, stress {stress}"
+            f"{f'{label}: ' * bool(label)}{self.control} {stretch}, stress {stress}"
             for label, stretch, stress in self._spans()
         )
         return f"{name}, {len(self.reading.used)} rows, {spans}"
+
+    @property
+    def control(self) -> str:
+        """What the measured stresses are along: stretch, or amount of shear."""
+        name = self.reading.experiment.mode.abscissa_control.name
+        return "stretch" if "stretch" in name else name
 
     @property
     def noise_sd(self) -> float | None:
@@ -106,10 +112,10 @@ class Inspection:
             yield "test", ", ".join(f"{name} {label}" for name, label in labels.items() if label)
         labels_of_spans, stretches, stresses = zip(*self._spans(), strict=True)
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
-        again = f"; {repeated} rows repeat a stretch" if repeated else ""
+        again = f"; rows at a repeated {self.control}: {repeated}" if repeated else ""
         axial, is_hoop_alone = used.axial_stretch, len(used.labels) == 1
         held = "" if axial is None or not is_hoop_alone else f" (hoop), axial stretch {stretches_held(axial)}"
-        yield "stretch", f"{'; '.join(labelled(labels_of_spans, stretches))}{held}{again}"
+        yield self.control.split()[-1], f"{'; '.join(labelled(labels_of_spans, stretches))}{held}{again}"
         yield "stress", f"{'; '.join(labelled(labels_of_spans, stresses))} (engineering stress, tension positive)"
         if used.standard_error.any():
             pairs = zip(used.standard_error, used.stress, strict=True)

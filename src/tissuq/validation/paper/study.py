@@ -48,7 +48,6 @@ class PaperSettings(PaperOptions):
 
     stretch_low: float = Field(0.5, gt=0, allow_inf_nan=False, description="smallest stretch")
     stretch_high: float = Field(4.25, gt=0, allow_inf_nan=False, description="largest stretch")
-    truth: dict[str, float] = Field(default_factory=lambda: dict(TRUTH))
 
     @field_validator("priors")
     @classmethod
@@ -62,12 +61,18 @@ class PaperSettings(PaperOptions):
         except InputError as error:
             raise ValueError(str(error)) from error
 
+    @field_validator("truth")
+    @classmethod
+    def _complete_truth(cls, truth: dict[str, float]) -> dict[str, float]:
+        if unknown := sorted(set(truth) - set(TRUTH)):
+            raise ValueError(f"a Yeoh material has no parameter {', '.join(unknown)}; it has {', '.join(TRUTH)}")
+        return TRUTH | truth
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.stretch_low >= self.stretch_high:
-            raise ValueError(f"stretch_low {self.stretch_low:g} must be less than stretch_high {self.stretch_high:g}")
-        if sorted(self.truth) != sorted(TRUTH):
-            raise ValueError(f"truth needs exactly {', '.join(TRUTH)}")
+            ends = f"the smallest stretch, {self.stretch_low:g}, must be less than the largest, {self.stretch_high:g}"
+            raise ValueError(f"{ends} (--stretch-range)")
         return self
 
     @property
