@@ -99,7 +99,7 @@ def test_stresses_along_axes_whose_measure_is_open_are_asked_about_and_the_advic
     stress = 1e3 * MU * (ramp() - ramp() ** -5)
     rows = [["lambda_x", "lambda_y", "sigma_xx[kPa]", "sigma_yy[kPa]"], *rows_of(ramp(), ramp(), stress, 2 * stress)]
     path = written(tmp_path / "sheet.csv", rows)
-    with pytest.raises(InputError, match=r"--stress-type\): engineering, cauchy"):
+    with pytest.raises(InputError, match=r"--stress-type; in Python stress_type\): engineering, cauchy"):
         read_tests(path)
     (test,) = read_tests(path, stress_type="cauchy")
     assert test.mode.name == "biaxial"

@@ -259,7 +259,7 @@ def say_which(kind: str) -> str:
     """Return how to say which measure of strain or stress a column is."""
     strains = [name for name, measure in STRAIN_MEASURES.items() if measure.stretch]
     names = strains if kind == "strain" else list(STRESS_MEASURES)
-    return f"Say which type it is (--{kind}-type): {', '.join(names[:-1])} or {names[-1]}."
+    return f"Say which type it is (--{kind}-type; in Python {kind}_type): {', '.join(names[:-1])} or {names[-1]}."
 
 
 def _deformation_hint(table: Table, contents: Contents, roles: Sequence[str]) -> str:
