@@ -9,7 +9,7 @@ from math import inf
 from typing import Any
 
 from tissuq.errors import ModelError
-from tissuq.mechanics.arithmetic import log
+from tissuq.mechanics.arithmetic import log, power
 from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
@@ -58,7 +58,7 @@ class _Ogden(StretchMaterial):
         l1, l2, l3 = stretches
         terms = len(self.parameters) // 2
         return sum(
-            2 * mu / alpha**2 * (l1**alpha + l2**alpha + l3**alpha - 3)
+            2 * mu / alpha**2 * (power(l1, alpha) + power(l2, alpha) + power(l3, alpha) - 3)
             for mu, alpha in zip(values[:terms], values[terms:], strict=True)
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from tissuq.mechanics.arithmetic import expm1
+from tissuq.mechanics.arithmetic import expm1, power
 from tissuq.mechanics.material import Material
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform
@@ -89,4 +89,4 @@ class Knowles(Material):
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, rate, exponent = values
-        return 0.5 * mu / rate * ((1 + rate * (I1 - 3) / exponent) ** exponent - 1)
+        return 0.5 * mu / rate * (power(1 + rate * (I1 - 3) / exponent, exponent) - 1)
