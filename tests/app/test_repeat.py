@@ -81,6 +81,15 @@ def test_false_is_written_as_its_own_switch():
     assert reading_words({"compression_positive": False, "until_peak": False}) == ["--tension-positive"]
 
 
+def test_a_sign_that_is_denied_stands_in_the_python_that_repeats_a_reading(here, write_stretches):
+    write_stretches(here)
+    reading = {"compression_positive": False, "skip_rows": 0}
+    said = done("inspect", {"files": ["kidney.csv"], "modes": ["uniaxial"], "reading": reading})
+    assert said["done"]["repeat"]["python"].endswith(
+        "print(tq.inspect('kidney.csv', compression_positive=False, skip_rows=0, mode='uniaxial'))"
+    )
+
+
 @pytest.mark.slow
 def test_a_fit_is_repeated_by_its_command_and_by_its_python(here, write_stretches, monkeypatch):
     write_stretches(here)

@@ -59,7 +59,7 @@ def inspect(request: Mapping[str, Any], say: Say) -> None:
     paths, prints = list(map(Path, files)), []
     for file, mode in zip(files, modes or [""] * len(files), strict=True):
         options = reading_of(Path(file), paths, reading) | {"mode": mode}
-        words = [repr(file), *(f"{name}={value!r}" for name, value in options.items() if value)]
+        words = [repr(file), *(f"{name}={value!r}" for name, value in options.items() if value not in (None, ""))]
         prints.append(f"print(tq.inspect({', '.join(words)}))")
     lines = "\n".join(["import tissuq as tq", "", *prints])
     say("done", record | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
