@@ -56,6 +56,17 @@ def test_sizes_sign_and_mode_are_asked_for_and_the_study_reads_the_file(negative
     np.testing.assert_allclose(data.stress, STRESS, atol=1e-8)
 
 
+def test_columns_that_one_of_several_files_has_do_not_hinder_the_others(here):
+    for name, head, times in (("odd", "alpha,beta [kPa]", 1), ("plain", "stretch,stress [kPa]", 2)):
+        rows = map("{:.9f},{:.9f}".format, STRETCH, 1e3 * times * STRESS)
+        (here / f"{name}.csv").write_text("\n".join([head, *rows]))
+    columns = ["--column", "stretch=alpha", "--column", "stress=beta [kPa]"]
+    said, text = answered(arguments=("odd.csv", "plain.csv", "--mode", "uniaxial", *columns))
+    assert said.exit_code == 0, said.output
+    assert "plain" in text
+    np.testing.assert_allclose(fitted_data().measured, np.concatenate([STRESS, 2 * STRESS]), atol=1e-8)
+
+
 @pytest.mark.parametrize(("number", "shown", "sign"), [("1", "--compression-positive", -1), ("2", "--turn load", 1)])
 def test_every_answer_that_is_listed_gives_what_it_says(negative, number, shown, sign):
     sizes = ("--length", "20 mm", "--area", "10 mm2")

@@ -17,7 +17,7 @@ from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH
 from tissuq.experiments.units import stress_unit
 from tissuq.studies.answers import Answer, answers_in, with_options
-from tissuq.studies.files_of_tests import find_tests, reading_of, tables_of, tests_in_words
+from tissuq.studies.files_of_tests import find_tests, tables_of, tests_in_words
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -69,7 +69,7 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path, mode in zip(paths, modes, strict=True):
         try:
-            tests += find_tests(path, reading_of(path, paths, reading) | {"mode": mode}, is_only_file=len(files) == 1)
+            tests += find_tests(path, {**reading, "mode": mode}, paths)
         except TissuqError as refusal:
             settings, start = {**reading, "mode": mode}, perf_counter()
             doubt = _question(path, str(refusal), columns, settings, paths, start, refused=True)
@@ -203,8 +203,7 @@ def _question(
             continue
         if perf_counter() - start < SECONDS_TO_TRY:
             try:
-                options = reading_of(file, files, with_options(settings, proposal))
-                tests = find_tests(file, options, is_only_file=len(files) == 1)
+                tests = find_tests(file, with_options(settings, proposal), files)
                 answer["gives"] = tests_in_words(tests)
             except TissuqError as refusal:
                 if str(refusal) == text or not refused:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ from tissuq.cli.command import command
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.numbers import wrapped
 from tissuq.studies.answers import DIMENSIONS, Answer, answers_in, options_in, with_options
-from tissuq.studies.files_of_tests import files_of, find_tests, reading_of, tables_of, tests_in_words
+from tissuq.studies.files_of_tests import files_of, find_tests, tables_of, tests_in_words
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import argument, option
 
@@ -65,9 +65,9 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path in files:
         if ask:
-            file_tests, settings = ask_about(path, settings, is_only_file=len(files) == 1)
+            file_tests, settings = ask_about(path, settings, files)
         else:
-            file_tests = find_tests(path, reading_of(path, files, settings), is_only_file=len(files) == 1)
+            file_tests = find_tests(path, settings, files)
         tests += file_tests
     inspections = [Inspection.of(reading) for _, reading in tests]
     print(inspections[0] if len(tests) == 1 else overview(inspections))
@@ -82,7 +82,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
         print(f"\nFigures: {out / 'figures'}" if len(tests) > 1 else f"\nFigure: {out / 'figures' / 'curve.png'}")
 
 
-def ask_about(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> tuple[Tests, dict[str, Any]]:
+def ask_about(file: Path, reading: Mapping[str, Any], files: Sequence[Path]) -> tuple[Tests, dict[str, Any]]:
     """Return the tests in a file, and the settings that read it, once a person has answered what it leaves open.
 
     Raises
@@ -94,12 +94,12 @@ def ask_about(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> 
     columns = list(dict.fromkeys(name for table in tables_of(file, settings) for name in table.names))
     while True:
         try:
-            tests = find_tests(file, settings, is_only_file=is_only_file)
+            tests = find_tests(file, settings, files)
         except InputError as refusal:
             answers = answers_in(str(refusal), columns, settings)
             if not answers:
                 raise
-            settings = _chosen(file, str(refusal), answers, settings, is_only_file=is_only_file) or settings
+            settings = _chosen(file, str(refusal), answers, settings, files) or settings
             continue
         question = next((text for text in _open_questions(tests) if text not in settled), None)
         if question is None:
@@ -108,7 +108,7 @@ def ask_about(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> 
         answers = answers_in(question, columns, settings)
         if not answers:
             continue
-        settings = _chosen(file, question, answers, settings, is_only_file=is_only_file, now=tests) or settings
+        settings = _chosen(file, question, answers, settings, files, now=tests) or settings
 
 
 def _open_questions(tests: Tests) -> list[str]:
@@ -127,15 +127,12 @@ def _chosen(
     question: str,
     answers: list[Answer],
     settings: Mapping[str, Any],
-    *,
-    is_only_file: bool,
+    files: Sequence[Path],
     now: Tests | None = None,
 ) -> dict[str, Any] | None:
     """Return the settings with the answer that a person types; None to leave things as they are ``now``."""
     print(f"\n{wrapped(question, WIDTH)}")
-    outcomes = {
-        answer: _what_it_gives(file, answer, settings, question, is_only_file=is_only_file) for answer in answers
-    }
+    outcomes = {answer: _what_it_gives(file, answer, settings, question, files) for answer in answers}
     if now is not None:
         is_read = {answer: text for answer, text in outcomes.items() if not text.startswith(REFUSED)}
         outcomes = is_read or outcomes
@@ -163,14 +160,14 @@ def _chosen(
 
 
 def _what_it_gives(
-    file: Path, answer: Answer, settings: Mapping[str, Any], question: str, *, is_only_file: bool
+    file: Path, answer: Answer, settings: Mapping[str, Any], question: str, files: Sequence[Path]
 ) -> str:
     """Return in words what an answer would give; nothing where the same would be asked again."""
     if answer.asked_for:
         is_size = set(answer.asked_for) <= set(DIMENSIONS)
         return "a size, to type with its unit" if is_size else "a number to type"
     try:
-        return tests_in_words(find_tests(file, with_options(settings, answer), is_only_file=is_only_file))
+        return tests_in_words(find_tests(file, with_options(settings, answer), files))
     except TissuqError as refusal:
         if str(refusal) == question:
             return ""

@@ -94,14 +94,13 @@ def measured(
         return reading | {"noise_sd": noise[0] if noise else None}, []
     held = _for_each([1] * len(files), "--axial-stretch", axial_stretches or [reading.get("axial_stretch")])
     of_files = [
-        find_tests(file, options | {"mode": mode, "axial_stretch": stretch}, is_only_file=len(files) == 1)
+        find_tests(file, reading | {"mode": mode, "axial_stretch": stretch}, files)
         for file, mode, stretch in zip(files, _modes(files, modes), held, strict=True)
-        for options in [reading_of(file, files, reading)]
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
     readings = [of_test for of_file in of_files for _, of_test in of_file]
     if any(reading.get(option) and not any(test.get(option) for test in tests) for option in OPTIONAL_FOR_TESTS):
-        find_tests(files[0], reading, is_only_file=True)
+        find_tests(files[0], reading, files[:1])
     if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
@@ -153,10 +152,10 @@ def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str |
     return [*modes] * (len(files) if len(modes) == 1 else 1)
 
 
-def find_tests(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> list[tuple[dict[str, Any], Reading]]:
+def find_tests(file: Path, reading: Mapping[str, Any], files: Sequence[Path]) -> list[tuple[dict[str, Any], Reading]]:
     """Return the tests in a file, or the one that ``FILE#NAME`` names: the settings that read each, and what is read.
 
-    One of several files that does not say its mode is without one.
+    One of several ``files`` that does not say its mode is without one, and is read with `reading_of` it.
 
     Raises
     ------
@@ -167,7 +166,8 @@ def find_tests(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) ->
     from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 
     path, _, name = (str(file), "", "") if file.exists() else str(file).partition("#")
-    options = {name: value for name, value in reading.items() if value is not None}
+    is_only_file = len(files) == 1
+    options = {name: value for name, value in reading_of(file, files, reading).items() if value is not None}
     reading_options = load_settings(ReadingSettings, None, options).reading_options
     tests = find_tests_in_file(path, is_one_of_several=not is_only_file, **reading_options)
     names = {str(number): test for number, test in enumerate(tests, start=1)} | {test.name: test for test in tests}

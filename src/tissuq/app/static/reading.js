@@ -74,15 +74,15 @@ const fieldOf = ([name, words, kind], reading, change) => {
 
 const columnsOf = (found, reading, change) => {
   const file = found.error?.file ?? found.tests[0]?.file, columns = found.tables[file]?.[0]?.columns ?? [];
-  const is_here = ([, name]) => columns.some(column => column.name === String(name)), said = Object.entries(reading.columns ?? {});
-  const seen = found.tests.find(test => test.file === file)?.roles ?? Object.fromEntries(said.filter(is_here).map(([role, name]) => [String(name), role]));
+  const isHere = ([, name]) => columns.some(column => column.name === String(name)), said = Object.entries(reading.columns ?? {});
+  const seen = found.tests.find(test => test.file === file)?.roles ?? Object.fromEntries(said.filter(isHere).map(([role, name]) => [String(name), role]));
   const roles = { ...seen };
   const choose = (name, role) => {
     const kinds = [role, ...RIVALS.filter(group => group.includes(role)).flat()];
     for (const other of Object.keys(roles)) if (other !== name && kinds.includes(roles[other])) delete roles[other];
     if (role) roles[name] = role; else delete roles[name];
     const chosen = Object.fromEntries(Object.entries(roles).map(([column, of]) => [of, column]));
-    change(now => ({ ...now, columns: { ...Object.fromEntries(said.filter(item => !is_here(item))), ...chosen } }));
+    change(now => ({ ...now, columns: { ...Object.fromEntries(said.filter(item => !isHere(item))), ...chosen } }));
   };
   return make("fieldset", {}, make("legend", { textContent: "Columns" }), make("div", { className: "columns" }, ...columns.map(column => {
     const select = options(make("select", { name: `column ${column.name}` }), [...new Set([...ROLES, ...Object.values(roles)])].map(role => ({ value: role, textContent: role.replace("_", " ") })), "not read");
