@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tissuq.decks.deck import DeckFormat, DeckMaterial, MeshSize
 from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Values, unknown_set
 from tissuq.errors import InputError
-from tissuq.finite_elements.deck_keywords import Keyword, joined, keywords_of
+from tissuq.finite_elements.deck_keywords import Keyword, generated, joined, keywords_of
 
 ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
 """Options of a material that a card replaces."""
@@ -187,11 +187,7 @@ def _members(keyword: Keyword) -> tuple[set[int], set[str]]:
         return {int(word) for word in words if word.isdecimal()}, {
             word.upper() for word in words if not word.isdecimal()
         }
-    numbers: set[int] = set()
-    for row in rows:
-        start, stop, step = (*map(int, row), 1)[:3]
-        numbers |= set(range(start, stop + 1, step))
-    return numbers, set()
+    return set(generated(rows)), set()
 
 
 SCRIPT = Path(__file__).with_name("odb_table.py")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 
@@ -77,3 +77,10 @@ def keywords_of(content: bytes) -> Iterator[Keyword]:
 def joined(word: str) -> str:
     """Return a keyword as the programs compare it: without blanks, in capitals."""
     return re.sub(r"\s", "", word).upper()
+
+
+def generated(rows: Iterable[Sequence[str]]) -> Iterator[int]:
+    """Yield the numbers that rows of a set with ``GENERATE`` stand for: the first, the last and the step, or one."""
+    for row in rows:
+        first, last, step = (*map(int, row), 1)[:3]
+        yield from range(first, last + 1, step)

@@ -11,7 +11,7 @@ import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
-from tissuq.finite_elements.deck_keywords import Keyword, encoded, joined, keywords_of
+from tissuq.finite_elements.deck_keywords import Keyword, encoded, generated, joined, keywords_of
 
 IN_A_FILE = re.compile(
     r"^(?P<keyword>\*(?:INCLUDE|NODE|ELEMENT|NSET|ELSET)\b(?:\s*,[^\n]*?)?)\s*,\s*INPUT\s*=\s*(?P<file>[^,\n]+)(?P<rest>[^\n]*)$",
@@ -167,8 +167,7 @@ class _Deck:
         is_of_nodes, scope = kind == "NSET", given.get("INSTANCE", self.scope).upper()
         sets = self.node_sets if is_of_nodes else self.element_sets
         if "GENERATE" in given:
-            bounds = [[*map(int, row), *[1] * (3 - len(row))] for row in data]
-            keys = [(scope, number) for first, last, step in bounds for number in range(first, last + 1, step)]
+            keys = [(scope, number) for number in generated(data)]
         else:
             keys = [key for row in data for word in row if word for key in self._members(sets, scope, word)]
         if is_of_nodes and "ELSET" in given:
@@ -189,7 +188,7 @@ class _Deck:
     def _add(self, sets: Members, scope: str, name: str, keys: list[Key]) -> None:
         if name:
             self.spelled.setdefault(name.upper(), name)
-            sets[scope, name.upper()] = [*sets.get((scope, name.upper()), []), *keys]
+            sets.setdefault((scope, name.upper()), []).extend(keys)
 
     def _place(self, part: str, placing: Sequence[Sequence[str]]) -> None:
         """Copy a part to the instance that begins: moved, and then turned around an axis, as its data say."""
