@@ -111,7 +111,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         band_table = _band_table(bands, several) / unit.to_mpa
         tables["new_patient"] = band_table.rename(columns={name: f"{name} [{unit.name}]" for name in band_table})
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
-    count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
+    count = len(study.tests)
     modes = ", ".join(mode.name for mode in study.modes)
     columns = ("stretch", "median", "low", "high")
     predicted = [Band(*(of_mode[name].to_numpy(float) for name in columns)) for of_mode, _ in bands.values()]
@@ -119,7 +119,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
-        subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
+        subject=f"{count} specimens, {modes}, {study.measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=tuple(Number(*estimate) for estimate in answer.estimates),
         finding=" ".join(filter(None, (_lead(study, answer), answer.law))),
         uses=answer.uses,

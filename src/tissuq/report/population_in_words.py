@@ -122,15 +122,16 @@ def between_specimens(study: PopulationStudy) -> str:
 def methods_of_population(study: PopulationStudy, answer: PopulationAnswer) -> Section:
     """Return the text for the methods section of a paper: specimens, model, hierarchy, computation and result."""
     population, unit = study.population, study.unit
-    posteriors, measurements = population.posteriors, sum(len(t) for tests in study.tests.values() for t in tests)
-    model = next(iter(posteriors.values())).model
-    of_specimens = f"{len(posteriors)} specimens ({', '.join(mode.name for mode in study.modes)} tests, {measurements}"
+    model = next(iter(population.posteriors.values())).model
+    modes = ", ".join(mode.name for mode in study.modes)
     numbers = (Number(*estimate) for estimate in answer.estimates)
     medians = "; ".join(f"{number.name} {number.text} ({number.range})" for number in numbers)
     sizes = errors_in_words(model.tolerances, unit)
     sentences = (
         INTRODUCTION.format(
-            law=LAW.format(model.material), version=version("tissuq"), data=of_specimens + " measurements)"
+            law=LAW.format(model.material),
+            version=version("tissuq"),
+            data=f"{len(population.posteriors)} specimens ({modes} tests, {study.measurements} measurements)",
         ),
         discrepancy_in_words(model, study.settings.discrepancy),
         noise_of_specimens(model, study.settings.noise_sd),

@@ -54,6 +54,11 @@ class PopulationStudy:
         return self.population.complete.model.experiment.modes
 
     @property
+    def measurements(self) -> int:
+        """How many measurements there are of all specimens."""
+        return sum(len(test) for tests in self.tests.values() for test in tests)
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings about data and fit."""
         return [*self.population.warnings, *self.data_warnings]
