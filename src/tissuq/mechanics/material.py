@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import accumulate, chain, combinations, pairwise
 from math import pi
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,8 @@ SUMS = {
     "gasser-ogden-holzapfel": "neo-hookean+dispersed-fibres",
 }
 """Sums that have a name in the literature, which is theirs everywhere."""
+Addends: TypeAlias = "tuple[tuple[Material, list[int]], ...]"
+"""Materials of which one is the sum, and which of its parameters each of them has."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Material(ABC):
         return values
 
     @property
-    def addends(self) -> tuple[tuple[Material, list[int]], ...]:
+    def addends(self) -> Addends:
         """Materials whose energies add up to this one, and which of its parameters each of them has."""
         return ((self, [*range(len(self.parameters))]),)
 
@@ -221,7 +223,7 @@ class MaterialSum(Material):
         return [(material, values[start:end]) for material, (start, end) in zip(self.summands, ends, strict=True)]
 
     @property
-    def addends(self) -> tuple[tuple[Material, list[int]], ...]:
+    def addends(self) -> Addends:
         """Those of its summands."""
         return tuple(
             (addend, [places_of_summand[place] for place in places])

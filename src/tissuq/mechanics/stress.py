@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tissuq.arrays import FloatArray
+from tissuq.arrays import BoolArray, FloatArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode, Path, SimpleShear, States
 from tissuq.experiments.modes.path import STEP, UNMEASURED, Deformation
 from tissuq.mechanics.equilibrium import energy_in_equilibrium, has_free_axis
-from tissuq.mechanics.material import Material
+from tissuq.mechanics.material import Addends, Material
 
 MAX_COMPLEX_STEP_VALUES, VALUES_AT_ONCE = 400_000, 10_000
 """Number of stresses from which compiling their derivatives takes less time, and of those that are computed at once."""
@@ -141,8 +141,8 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     rows = np.atleast_2d(settings)
     _check_nonlinear(material, rows.shape[1:])
     _check_deformations(material, states)
-    if len(material.addends) > 1 and not has_free_axis(material, states):
-        bases = _bases_of_addends(material, states, rows)
+    if len(addends := material.addends) > 1 and not has_free_axis(material, states):
+        bases = _bases_of_addends(addends, material.linear_mask, states, rows)
         return bases if settings.ndim == 2 else np.asarray(bases[0])
     curves = complex_step_stress(material, states, material.unit_values(rows).reshape(-1, len(material.parameters)))
     if curves is None:
@@ -151,17 +151,14 @@ def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) 
     return bases if settings.ndim == 2 else np.asarray(bases[0])
 
 
-def _bases_of_addends(material: Material, states: States, rows: FloatArray) -> FloatArray:
-    """Return `stress_basis` (m, n, k) at values (m, s), the columns of each addend by themselves."""
-    is_linear = material.linear_mask
-    values = np.zeros((len(rows), is_linear.size))
-    values[:, ~is_linear] = rows
-    bases = np.zeros((len(rows), len(states), is_linear.size))
-    for addend, places in material.addends:
-        nonlinear = values[:, places][:, ~addend.linear_mask]
-        columns = np.array(places)[addend.linear_mask]
-        bases[:, :, columns] = stress_basis(addend, states, nonlinear if nonlinear.shape[1] else ())
-    return bases[:, :, is_linear]
+def _bases_of_addends(addends: Addends, is_linear: BoolArray, states: States, rows: FloatArray) -> FloatArray:
+    """Return `stress_basis` (m, n, k) of their sum at values (m, s), the columns of each by themselves."""
+    column = np.where(is_linear, np.cumsum(is_linear), np.cumsum(~is_linear)) - 1  # of the basis, or of the rows
+    bases = np.empty((len(rows), len(states), int(is_linear.sum())))
+    for addend, places in addends:
+        linear, nonlinear = column[places][addend.linear_mask], column[places][~addend.linear_mask]
+        bases[:, :, linear] = stress_basis(addend, states, rows[:, nonlinear] if len(nonlinear) else ())
+    return bases
 
 
 def stresses_by_basis(material: Material, states: States, values: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import Any
 
 from tissuq.errors import ModelError
 from tissuq.mechanics.arithmetic import log, power
-from tissuq.mechanics.material import Material, StretchMaterial
+from tissuq.mechanics.material import Addends, StretchMaterial
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 
@@ -49,7 +49,7 @@ class _Ogden(StretchMaterial):
     source = "Ogden 1972"
 
     @property
-    def addends(self) -> tuple[tuple[Material, list[int]], ...]:
+    def addends(self) -> Addends:
         """Laws of one term each."""
         count = len(self.parameters) // 2
         return tuple((Ogden1(), [number, count + number]) for number in range(count))
