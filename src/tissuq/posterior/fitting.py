@@ -14,7 +14,6 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements
-from tissuq.inference.threads import one_thread
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
@@ -220,21 +219,16 @@ def fit_many(
             model = solver.with_spreads_of_tests(model)
         return solver.with_probable_noise(model)
 
-    with one_thread():
-        return _posteriors([model_of(data) for data in experiments], solver)
-
-
-def _posteriors(models: Sequence[StatisticalModel], solver: Solver) -> list[Posterior]:
-    """Return the posteriors of models, those of one test each on the same stretches solved together."""
+    models = [model_of(data) for data in experiments]
     groups: dict[tuple[States, int], list[int]] = {}
     for number, model in enumerate(models):
-        is_shared = len(model.experiment.tests) == 1 and not model.tolerances and not model.noise.is_consecutive
+        is_shared = len(model.experiment.tests) == 1 and not model.tolerances and not noise_model.is_consecutive
         groups.setdefault((model.experiment.states, 0 if is_shared else number), []).append(number)
     posteriors: dict[int, Posterior] = {}
     for numbers in groups.values():
         solutions = solver.solve([models[number] for number in numbers])
         posteriors |= {number: Posterior(solution, solver) for number, solution in zip(numbers, solutions, strict=True)}
-    return [posteriors[number] for number in range(len(models))]
+    return [posteriors[number] for number in range(len(datasets))]
 
 
 def _noise_of_means(noise: Noise, rows: Experiment) -> Noise:

@@ -25,7 +25,6 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
-from tissuq.inference.threads import one_thread
 from tissuq.mechanics import Material
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
@@ -181,8 +180,7 @@ class Posterior(PosteriorPlots):
     @cached_property
     def _assessment(self) -> Assessment:
         alike = self.solver if self.diagnostics is not None else self.solver.for_checks
-        with one_thread():
-            return assess(self.solution, self.solver.solve, alike.solve, self.stable_ranges)
+        return assess(self.solution, self.solver.solve, alike.solve, self.stable_ranges)
 
     def stability(
         self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41

@@ -16,6 +16,7 @@ from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.enumerators.nodes import Guide
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.solution import Enumerator, Solution
+from tissuq.inference.threads import one_thread
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates
 
@@ -55,18 +56,21 @@ class Solver:
 
     def solve(self, models: Sequence[StatisticalModel]) -> list[Solution]:
         """Return the posteriors of models on the same stretches."""
-        solutions = self._solve([self._error_estimates().of(model) for model in models])
-        if self.stable_in:
-            solutions = [stable_part(solution, self.stable_in, self.seed) for solution in solutions]
-        return list(solutions)
+        with one_thread():
+            solutions = self._solve([self._error_estimates().of(model) for model in models])
+            if self.stable_in:
+                solutions = [stable_part(solution, self.stable_in, self.seed) for solution in solutions]
+            return list(solutions)
 
     def with_spreads_of_tests(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose spreads between specimens and tests are as large as several tests tell."""
-        return self._error_estimates().with_spreads_of_tests(model)
+        with one_thread():
+            return self._error_estimates().with_spreads_of_tests(model)
 
     def with_probable_noise(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose unknown noise is autoregressive where the data are far more probable so."""
-        return self._error_estimates().with_probable_noise(model)
+        with one_thread():
+            return self._error_estimates().with_probable_noise(model)
 
     def _error_estimates(self) -> ErrorEstimates:
         similar_solver = partial(self._known_solver, ROUGH)

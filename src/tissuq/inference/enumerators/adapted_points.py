@@ -19,7 +19,6 @@ from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.proposal_mixture import Mixture, fitted, weighted_points
 from tissuq.inference.quasi_monte_carlo import Proposal, effective, even_points, log_normal
 from tissuq.inference.solution import Marginals, Solution
-from tissuq.inference.threads import one_thread
 from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
 from tissuq.model.scales import MAX_SCORE, at_scores
 from tissuq.model.statistical_model import StatisticalModel
@@ -75,8 +74,7 @@ class AdaptedPoints:
         ConvergenceError
             When few of the points hold nearly everything, or the sum does not settle.
         """
-        with one_thread():
-            return [self._solution(model, seed) for model in models]
+        return [self._solution(model, seed) for model in models]
 
     def _solution(self, model: StatisticalModel, seed: int) -> Solution:
         density, dimension = _Density(model), len(model.nonlinear)

@@ -31,7 +31,6 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
 from tissuq.inference.solution import Marginals, Solution
-from tissuq.inference.threads import one_thread
 from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
@@ -100,12 +99,11 @@ class AdaptiveCells:
             raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
         together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
         blocks = [models[start : start + together] for start in range(0, len(models), together)]
-        with one_thread():
-            return [
-                _solution(integration, index, seed)
-                for integration in (_Integration(block, self) for block in blocks)
-                for index in range(len(integration.models))
-            ]
+        return [
+            _solution(integration, index, seed)
+            for integration in (_Integration(block, self) for block in blocks)
+            for index in range(len(integration.models))
+        ]
 
 
 class _Integration:

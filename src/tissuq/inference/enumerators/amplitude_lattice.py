@@ -34,7 +34,6 @@ from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
-from tissuq.inference.threads import one_thread
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
@@ -110,17 +109,16 @@ class AmplitudeLattice:
                 f"{reason}: choose otherwise, or another discrepancy."
             )
         bounded_points = self.guide.accuracy.bounded_points
-        with one_thread():
-            if Outer(models[0]).symbols:
-                few = bounded_points // OUTER_BOUNDED_DIVISOR
-                sums = (_EnergySums(model, *weighted_nodes(model, self.guide), few) for model in models)
-                return [energy_sums.solution(self.components, seed) for energy_sums in sums]
-            nodes = single_nodes(models, self.guide)
-            sums = (
-                _EnergySums(model, [node], np.zeros(1), 0.0, bounded_points)
-                for model, node in zip(models, nodes, strict=True)
-            )
+        if Outer(models[0]).symbols:
+            few = bounded_points // OUTER_BOUNDED_DIVISOR
+            sums = (_EnergySums(model, *weighted_nodes(model, self.guide), few) for model in models)
             return [energy_sums.solution(self.components, seed) for energy_sums in sums]
+        nodes = single_nodes(models, self.guide)
+        sums = (
+            _EnergySums(model, [node], np.zeros(1), 0.0, bounded_points)
+            for model, node in zip(models, nodes, strict=True)
+        )
+        return [energy_sums.solution(self.components, seed) for energy_sums in sums]
 
 
 def _lattice_error(prior: Prior) -> float:
