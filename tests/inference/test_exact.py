@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm, truncnorm
@@ -11,7 +13,7 @@ from marks import slow_but
 from oracle import FORMULATIONS, brute_force
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.linear import ConditionalGaussian
-from tissuq.mechanics import NeoHookean, Yeoh, stress_basis
+from tissuq.mechanics import NeoHookean, Yeoh, material_named, stress_basis
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -263,3 +265,22 @@ def test_solving_twice_from_one_model_is_stateless(paper):
     )
     (first,), (second,) = AdaptiveCells().solve([model], 1), AdaptiveCells().solve([model], 1)
     assert first.log_evidence == second.log_evidence
+
+
+@pytest.mark.parametrize("noise_sds", [(0.004, 0.02, 0.1, 0.005), (0.1, 0.004)], ids=["wider", "narrower"])
+def test_similar_models_in_turn_have_the_posteriors_that_each_has_by_itself(noise_sds):
+    stretch = np.linspace(0.8, 1.3, 20)
+    data = tq.simulate("fung", {"mu": 0.4, "b": 1.5}, stretch, 0.005, seed=2)
+    priors = {"mu": tq.Uniform(0, 5), "b": tq.LogUniform(0.02, 10)}
+    models = [StatisticalModel(data, material_named("fung"), discrepancy_named("none"), sd, priors) for sd in noise_sds]
+    other_priors = replace(models[0], chosen_priors=priors | {"b": tq.LogUniform(0.02, 1.2)})
+    other_law = replace(models[0], material=material_named("demiray"))
+    cells = AdaptiveCells()
+    for model in (*models, other_priors, other_law):
+        (in_turn,), (alone,) = cells.solve([model]), AdaptiveCells().solve([model])
+        assert in_turn.log_evidence == pytest.approx(alone.log_evidence, abs=2e-6)
+        for symbol in ("mu", "b"):
+            first, second = in_turn.marginals[symbol], alone.marginals[symbol]
+            assert first.mean == pytest.approx(second.mean, abs=1e-3 * second.sd)
+            assert first.sd == pytest.approx(second.sd, rel=1e-3)
+            assert first.hdi() == pytest.approx(second.hdi(), abs=0.01 * second.sd)

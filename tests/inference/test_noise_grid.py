@@ -30,13 +30,13 @@ def errors(model, tolerances=TOLERANCES):
     return sum(size**2 * of_unit[name] for name, size in tolerances.sizes.items())
 
 
-def given(covariance):
-    """Log densities of the data, and means and variances of C10, for covariances (..., 12, 12) and a prior width of 5.
+def given(covariance, column=X):
+    """Log densities of the data, and means and variances of the factor of a column, for covariances (..., 12, 12).
 
-    The prior's ends are far away.
+    Its prior has a width of 5, and ends far away.
     """
     inverse = np.linalg.inv(covariance)
-    precision, pull = X @ inverse @ X, X @ inverse @ STRESS
+    precision, pull = column @ inverse @ column, column @ inverse @ STRESS
     rest = STRESS @ inverse @ STRESS - pull**2 / precision
     constant = 11 * np.log(2 * np.pi) + 2 * np.log(5)
     density = -0.5 * (rest + np.linalg.slogdet(covariance)[1] + np.log(precision) + constant)
@@ -44,7 +44,7 @@ def given(covariance):
 
 
 def assert_agrees(posterior, log_noise, log_weights, mean, variance):
-    """Compare with log weights (noise, ...) on a grid of the noise, and C10's means and variances there."""
+    """Compare with log weights (noise, ...) on a grid of the noise, and the stiffness's means and variances there."""
     weights = np.exp(log_weights - log_weights.max())
     total = weights.sum()
     weights = weights / total
@@ -53,7 +53,7 @@ def assert_agrees(posterior, log_noise, log_weights, mean, variance):
     sd = np.sqrt((weights * (variance + (mean - centre) ** 2)).sum())
     assert posterior.log_evidence == pytest.approx(evidence, abs=0.02)
     assert abs(posterior.log_evidence - evidence) < max(posterior.log_evidence_error, 0.01)
-    found = posterior.marginals["C10"]
+    found = posterior.marginals[posterior.model.headline]
     assert abs(found.mean - centre) < 0.01 * sd
     assert found.sd == pytest.approx(sd, rel=0.01)
     of_noise = weights.reshape(len(log_noise), -1).sum(axis=1)
@@ -77,6 +77,24 @@ def test_errors_of_the_test_do_not_grow_with_the_noise(data, tolerances):
     density, mean, variance = given(noise[:, None, None] ** 2 * np.eye(12) + fixed)
     prior = halfnorm(scale=0.1).logpdf(noise) + LOG_NOISE + np.log(LOG_NOISE[1] - LOG_NOISE[0])
     assert_agrees(posterior, LOG_NOISE, density + prior, mean, variance)
+
+
+def test_a_parameter_of_a_curved_law_is_integrated_at_every_noise(data):
+    """Each value of the noise begins at the cells of another one: all are right, and so is their sum."""
+    priors = {"mu": tq.Uniform(0, 5), "b": tq.LogUniform(0.02, 5), "noise_sd": tq.HalfNormal(0.1)}
+    posterior = tq.fit(data, material="demiray", discrepancy="none", priors=priors, tolerances=TOLERANCES)
+    noise, log_b = np.exp(LOG_NOISE[::4]), np.linspace(np.log(0.02), np.log(5), 201)
+    covariances = noise[:, None, None] ** 2 * np.eye(12) + errors(posterior.model)
+    of_b = [given(covariances, X / 2 * np.exp(b * STRAIN)) for b in np.exp(log_b)]
+    weights, mean, variance = (np.transpose(part) for part in zip(*of_b, strict=True))
+    cells = np.full(201, 1 / 200)
+    cells[[0, -1]] /= 2
+    of_noise = halfnorm(scale=0.1).logpdf(noise) + np.log(noise) + np.log(4 * (LOG_NOISE[1] - LOG_NOISE[0]))
+    assert_agrees(posterior, np.log(noise), weights + np.log(cells) + of_noise[:, None], mean, variance)
+    of_b = np.exp(weights + np.log(cells) + of_noise[:, None] - posterior.log_evidence).sum(axis=0)
+    for probability in (0.1, 0.5, 0.9):
+        expected = np.exp(np.interp(probability, np.cumsum(of_b), log_b))
+        assert posterior.marginals["b"].quantile(probability) == pytest.approx(expected, rel=0.03)
 
 
 def test_an_energy_beside_them_is_summed_over_its_amplitudes_and_lengths(data):

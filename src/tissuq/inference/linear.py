@@ -20,7 +20,7 @@ import numpy as np
 from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.box import Boxes
-from tissuq.inference.reduction import Reducer, Reduction, Spectrum
+from tissuq.inference.reduction import BentBases, Reducer, Reduction, Spectrum
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
@@ -221,10 +221,10 @@ class ConditionalGaussian:
     that neither the size of the stresses nor nearly dependent columns cost digits.
     """
 
-    def __init__(self, models: Sequence[StatisticalModel]) -> None:
+    def __init__(self, models: Sequence[StatisticalModel], bases: BentBases | None = None) -> None:
         self.models = tuple(models)
         self.model = self.models[0]
-        self._reduce = Reducer(self.models)
+        self._reduce = Reducer(self.models, bases)
         gaussians = np.array([[m.priors[s].gaussian for s in m.linear] for m in self.models], dtype=np.float64)
         self._prior_mean, self._prior_precision, constant = np.moveaxis(gaussians.reshape(len(models), -1, 3), 2, 0)
         self._log_constant = constant.sum(axis=1) + self.model.log_whitening

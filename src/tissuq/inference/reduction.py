@@ -12,6 +12,7 @@ import numpy as np
 from tissuq.arrays import FloatArray
 from tissuq.experiments.modes import States
 from tissuq.inference.threads import one_thread
+from tissuq.mechanics.material import Material
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
@@ -23,6 +24,8 @@ MIN_RELATIVE_EIGENVALUE = 1e-17
 """Eigenvalue, relative to that, below which the decomposition of few points gives only rounding errors."""
 FEW_POINTS = 128
 """Measurements up to which a correlation is decomposed directly."""
+MAX_REMEMBERED_VALUES = 12_000_000
+"""Stresses of unit parameters that are remembered: about 100 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +167,35 @@ class Reduction:
         return cls(inverse, log_size, centre, squares, *directions)
 
 
+class BentBases:
+    """Mean stresses of unit parameters at values of those in which stresses are not linear: remembered.
+
+    They are the same whatever errors the measurements have, and most of the work for laws with fibres. Of the last
+    material, discrepancy and states.
+    """
+
+    def __init__(self) -> None:
+        self._of: tuple[Material, Discrepancy, States] | None = None
+        self._bases: dict[tuple[float, ...], FloatArray] = {}
+
+    def __call__(self, model: StatisticalModel, settings: Sequence[tuple[float, ...]]) -> FloatArray:
+        """Return the stresses (m, n, k) of a model at m settings of these parameters."""
+        of = model.material, model.discrepancy, model.states
+        if self._of != of:
+            self._of, self._bases = of, {}
+        new = [setting for setting in dict.fromkeys(settings) if setting not in self._bases]
+        computed = dict(zip(new, model.basis(model.states, np.array(new)), strict=True)) if new else {}
+        bases = np.array([computed[key] if key in computed else self._bases[key] for key in settings])
+        if (len(self._bases) + len(computed)) * bases[0].size <= MAX_REMEMBERED_VALUES:
+            self._bases |= computed
+        return bases
+
+
 class Reducer:
     """Reduces the data of models with the same parts and stretches, given the structure; remembers what it did."""
 
-    def __init__(self, models: Sequence[StatisticalModel]) -> None:
-        self._models = models
+    def __init__(self, models: Sequence[StatisticalModel], bases: BentBases | None = None) -> None:
+        self._models, self._bases = models, bases or BentBases()
         self._known: dict[tuple[float, ...], Reduction] = {}
 
     def __call__(self, settings: FloatArray) -> Reduction:
@@ -193,13 +220,14 @@ class Reducer:
         model = self._models[0]
         n, bent = model.experiment.size, len(model.bent_symbols)
         is_plain = not model.is_correlated and not model.noise.depends_on_level
+        if bent:
+            blocks_of_designs = _designs(model, settings, self._bases)
         if bent and is_plain:
-            blocks_of_designs = _designs(model, settings)
             return [
                 reduction for block in blocks_of_designs for reduction in _of_independent_errors(self._models, block)
             ]
         if bent:
-            fits = (_Fit.of(self._models, design) for block in _designs(model, settings) for design in block)
+            fits = (_Fit.of(self._models, design) for block in blocks_of_designs for design in block)
             pairs = zip(fits, settings, strict=True)
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
         if is_plain and (len(self._models) == 1 or n > CHUNK):
@@ -211,12 +239,14 @@ class Reducer:
         return [reduction for block in blocks for reduction in _reduced(model, self._fit, block)]
 
 
-def _designs(model: StatisticalModel, settings: Sequence[tuple[float, ...]]) -> Iterator[FloatArray]:
+def _designs(
+    model: StatisticalModel, settings: Sequence[tuple[float, ...]], bases_of: BentBases
+) -> Iterator[FloatArray]:
     """Yield the designs (K, n, k) at the first values of settings, as many as their stresses are computed at once."""
-    bent = np.array([setting[: len(model.bent_symbols)] for setting in settings])
+    bent = [setting[: len(model.bent_symbols)] for setting in settings]
     together = max(1, MAX_COMPLEX_STEP_VALUES // (len(model.states) * len(model.column_symbols)))
     for start in range(0, len(bent), together):
-        bases = model.basis(model.states, bent[start : start + together])
+        bases = bases_of(model, bent[start : start + together])
         columns = bases.swapaxes(0, 1)
         rows = model.rows(columns.reshape(len(columns), -1))  # of all designs side by side
         yield np.ascontiguousarray(rows.reshape(-1, *columns.shape[1:]).swapaxes(0, 1))

@@ -107,14 +107,16 @@ class Solver:
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice, points = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy)), AdaptedPoints(accuracy)
-        are_checked = iter([accuracy == FINE])  # the first value of the noise is the least, where a ridge is thinnest
+        cells = AdaptiveCells(
+            accuracy == FINE, accuracy.tolerance
+        )  # the first noise is the least, its ridge the thinnest
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
             if not _suits_cells(model):
                 return points.solve([model], self.seed)[0]
-            return self._solve([model], AdaptiveCells(next(are_checked, False), accuracy.tolerance))[0]
+            return self._solve([model], cells)[0]
 
         return solve_known
 

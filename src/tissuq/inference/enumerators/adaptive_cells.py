@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from tissuq.inference.enumerators.line import FINE
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
     START_PROBABILITIES,
+    Cells,
     Lines,
     Quadrature,
     has_missed,
@@ -30,32 +32,43 @@ from tissuq.inference.enumerators.survey import (
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
+from tissuq.inference.reduction import BentBases
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat
+from tissuq.parameters.priors import Flat, Prior
 
 DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
 MANY_LINES = 2000
 """Of a quadrature, beyond which a marginal is tabulated at fewer points."""
+MAX_GROWTH = 2.0
+"""Number of cells, over that of the first model for which they were made, up to which similar models begin at them."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class AdaptiveCells:
     """Adaptive quadrature over at most three nonlinear parameters; a single setting where there is none.
+
+    Models that are solved one after another are to be similar: they differ by their errors alone.
 
     Parameters
     ----------
     is_checked : bool
         Whether climbs from other values of the structure see that no mass was missed, which takes as long again; of
-        models that differ by the noise alone one tells it of all.
+        similar models one tells it of all.
     tolerance : float
         Of the interpolation, relative to the integral.
+    start : Start, optional
+        Cells at which the next model begins: those of the last one, unless they had become many.
+    bases : BentBases
+        Stresses that are remembered from one model to the next.
     """
 
     is_checked: bool = True
     tolerance: float = FINE.tolerance
+    start: Start | None = None
+    bases: BentBases = field(default_factory=BentBases)
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""
@@ -101,9 +114,31 @@ class AdaptiveCells:
         blocks = [models[start : start + together] for start in range(0, len(models), together)]
         return [
             _solution(integration, index, seed)
-            for integration in (_Integration(block, self) for block in blocks)
+            for integration in (self._integration(block) for block in blocks)
             for index in range(len(integration.models))
         ]
+
+    def _integration(self, models: Sequence[StatisticalModel]) -> _Integration:
+        """Integrate models together, or a single one from where the last one was."""
+        integration = _Integration(models, self)
+        if len(models) == 1 and integration.warp and (rule := integration.rule):
+            count, start = len(rule.cells.lower), integration.start
+            fewest = start.fewest if start else count
+            if count <= MAX_GROWTH * fewest:
+                self.start = Start(integration.priors[0], integration.warp, rule.cells, fewest)
+            else:
+                self.start, self.bases = None, BentBases()
+            self.is_checked = False
+        return integration
+
+
+class Start(NamedTuple):
+    """Cells in the coordinates of a warp of parameters with priors, and their number for the first such model."""
+
+    priors: Sequence[Prior]
+    warp: Warp
+    cells: Cells
+    fewest: int
 
 
 class _Integration:
@@ -111,15 +146,22 @@ class _Integration:
 
     def __init__(self, models: Sequence[StatisticalModel], cells: AdaptiveCells) -> None:
         self.models = models
-        self.conditional = ConditionalGaussian(models)
+        self.conditional = ConditionalGaussian(models, cells.bases)
         self.dimension = len(models[0].nonlinear)
-        self._priors = [[model.priors[symbol] for symbol in model.nonlinear] for model in models]
+        self.priors = [[model.priors[symbol] for symbol in model.nonlinear] for model in models]
+        is_similar = len(models) == 1 and cells.start and cells.start.priors == self.priors[0]
+        self.start = cells.start if is_similar else None
         self._top = np.full((len(models), 1), -np.inf)
         self.rule: Quadrature | None = None
         self.warp: Warp | None = None
         if self.dimension:
-            self.warp = warp_along(survey(self._priors, len(models[0].structure), self._log_ceiling))
-            self.rule = integrate(self._log_integrand, self.dimension, cells.tolerance)
+            first_cells = self.start.cells if self.start else None
+            self.warp = (
+                self.start.warp
+                if self.start
+                else warp_along(survey(self.priors, len(models[0].structure), self._log_ceiling))
+            )
+            self.rule = integrate(self._log_integrand, self.dimension, cells.tolerance, first_cells)
             self.settings = self.warp.parameters(self.rule.points)[0]
         else:
             self.settings = np.zeros((len(models), 1, 0))
@@ -131,7 +173,7 @@ class _Integration:
     def _check_found(self, index: int, weights: FloatArray) -> None:
         """Refuse the integral of one posterior that has mass where the survey's lattice did not see it."""
         assert self.warp is not None  # noqa: S101 (there is a structure)
-        is_log, priors = self.warp.is_log, self._priors[index : index + 1]
+        is_log, priors = self.warp.is_log, self.priors[index : index + 1]
         conditional, structure = ConditionalGaussian(self.models[index : index + 1]), self.models[0].structure
 
         def log_density(g: FloatArray) -> FloatArray:
@@ -169,7 +211,7 @@ class _Integration:
         with np.errstate(over="ignore", invalid="ignore"):  # where a parameter runs to infinity nothing is probable
             gaussians = self.conditional(h)
             ceiling = _ceiling(self.conditional, gaussians)
-            value = gaussians.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
+            value = gaussians.log_likelihood + ceiling + log_prior_density(self.priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
         is_exact = np.zeros(value.shape, dtype=bool)
         for margin in (0.0, IRRELEVANT_LOG_DROP):  # the best ones first, which tell what matters

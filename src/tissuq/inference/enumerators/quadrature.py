@@ -138,7 +138,9 @@ class Quadrature:
         )
 
 
-def integrate(log_function: LogFunction, dimension: int, tolerance: float = FINE.tolerance) -> Quadrature:
+def integrate(
+    log_function: LogFunction, dimension: int, tolerance: float = FINE.tolerance, start: Cells | None = None
+) -> Quadrature:
     """Integrate exp(log_function) over the unit cube of one to three dimensions, for B functions at once.
 
     Cells are halved along the side in which a function is worst resolved until the interpolation error of every
@@ -152,13 +154,15 @@ def integrate(log_function: LogFunction, dimension: int, tolerance: float = FINE
     dimension : int
         One to three.
     tolerance : float
+    start : Cells, optional
+        Those of similar functions, whose boxes are the first.
 
     Raises
     ------
     ConvergenceError
         When the tolerance is not reached with the largest number of cells, or a function vanishes everywhere.
     """
-    cells = _first_cells(log_function, dimension)
+    cells = _evaluated(log_function, start.lower, start.width) if start else _first_cells(log_function, dimension)
     while True:
         top = cells.log_values.max(axis=(1, 2))
         if not np.isfinite(top).all():
