@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,8 @@ MIN_RELATIVE_EIGENVALUE = 1e-17
 """Eigenvalue, relative to that, below which the decomposition of few points gives only rounding errors."""
 FEW_POINTS = 128
 """Measurements up to which a correlation is decomposed directly."""
-MAX_REMEMBERED_VALUES = 12_000_000
-"""Stresses of unit parameters that are remembered: about 100 MB."""
+MAX_REMEMBERED_VALUES = 16_000_000
+"""Stresses of unit parameters that are remembered: 128 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +171,8 @@ class Reduction:
 class BentBases:
     """Mean stresses of unit parameters at values of those in which stresses are not linear: remembered.
 
-    They are the same whatever errors the measurements have, and most of the work for laws with fibres. Of the last
-    material, discrepancy and states.
+    They are the same whatever errors the measurements have, and most of the work for laws with fibres. Those of the
+    last material, discrepancy and states; what was not used for longest is forgotten first.
     """
 
     def __init__(self) -> None:
@@ -183,11 +184,15 @@ class BentBases:
         of = model.material, model.discrepancy, model.states
         if self._of != of:
             self._of, self._bases = of, {}
-        new = [setting for setting in dict.fromkeys(settings) if setting not in self._bases]
-        computed = dict(zip(new, model.basis(model.states, np.array(new)), strict=True)) if new else {}
-        bases = np.array([computed[key] if key in computed else self._bases[key] for key in settings])
-        if (len(self._bases) + len(computed)) * bases[0].size <= MAX_REMEMBERED_VALUES:
-            self._bases |= computed
+        distinct = [*dict.fromkeys(settings)]
+        used = {setting: self._bases.pop(setting) for setting in distinct if setting in self._bases}
+        if new := [setting for setting in distinct if setting not in used]:
+            used |= zip(new, map(np.copy, model.basis(model.states, np.array(new))), strict=True)
+        bases = np.array([used[setting] for setting in settings])
+        self._bases |= used
+        excess = len(self._bases) - MAX_REMEMBERED_VALUES // bases[0].size
+        for setting in list(islice(self._bases, max(0, excess))):
+            del self._bases[setting]
         return bases
 
 

@@ -60,7 +60,7 @@ class AdaptiveCells:
     tolerance : float
         Of the interpolation, relative to the integral.
     start : Start, optional
-        Cells at which the next model begins: those of the last one, unless they had become many.
+        Cells at which the next model begins: those of the most probable one so far, unless they had become many.
     bases : BentBases
         Stresses that are remembered from one model to the next.
     """
@@ -119,15 +119,14 @@ class AdaptiveCells:
         ]
 
     def _integration(self, models: Sequence[StatisticalModel]) -> _Integration:
-        """Integrate models together, or a single one from where the last one was."""
+        """Integrate models together, or a single one from where the most probable one was."""
         integration = _Integration(models, self)
         if len(models) == 1 and integration.warp and (rule := integration.rule):
-            count, start = len(rule.cells.lower), integration.start
+            count, start, log_integral = len(rule.cells.lower), integration.start, float(rule.log_integral[0])
             fewest = start.fewest if start else count
-            if count <= MAX_GROWTH * fewest:
-                self.start = Start(integration.priors[0], integration.warp, rule.cells, fewest)
-            else:
-                self.start, self.bases = None, BentBases()
+            if not start or log_integral > start.log_integral:
+                reached = Start(integration.priors[0], integration.warp, rule.cells, fewest, log_integral)
+                self.start = reached if count <= MAX_GROWTH * fewest else None
             self.is_checked = False
         return integration
 
@@ -139,6 +138,7 @@ class Start(NamedTuple):
     warp: Warp
     cells: Cells
     fewest: int
+    log_integral: float
 
 
 class _Integration:
