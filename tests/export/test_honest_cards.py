@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+import tissuq as tq
 from card_readers import READERS
 from tissuq.export import CardSettings, card_format
 
@@ -95,3 +96,23 @@ def test_cards_that_do_not_follow_their_draws_are_not_to_be_computed_with(given)
     assert "the card does NOT stand for the draw: do not compute with it" in wrong
     assert "do not compute" not in right
     assert cards.warnings[0].startswith("Do NOT compute with the cards of draw 1 of 2: their stresses are off by ")
+
+
+def test_what_of_a_discrepancy_is_in_the_draws_and_what_is_not_is_said(data):
+    """The terms of 'yeoh' are in the cards; its scatter S, in the predicted stress alone, is not."""
+    posterior = tq.fit(data, noise_sd=0.02, discrepancy="yeoh", tolerances="as-tested")
+    cards = card_format("abaqus").cards(posterior.ensemble(3), CardSettings(unit="kPa"))
+    for row, text in zip(cards.index, cards.files.values(), strict=True):
+        constants = [row[f"C{n}0"] for n in (1, 2, 3)]
+        assert [row[f"card_C{n}0"] for n in (1, 2, 3)] == pytest.approx(constants)
+        assert row["initial_shear_modulus"] == pytest.approx(2 * row["C10"])
+        words = " ".join(text.replace("** ", " ").split())
+        assert f"C20 = {row['C20']:.6g}, C30 = {row['C30']:.6g}" in words
+        assert "energy of the draws: material and discrepancy" in words
+        assert "The scatter S of the discrepancy 'yeoh' about its mean is in no draw" in words
+    assert "spreads less than the stress that the fit predicts" in cards.warnings[0]
+    band = posterior.predict([1.5], noise=False)
+    spread = np.ptp(
+        np.quantile(posterior.ensemble(200, admissible=False).stress("uniaxial", np.array([1.5])), [0.025, 0.975])
+    )
+    assert spread < (band["high"] - band["low"])[0]

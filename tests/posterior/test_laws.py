@@ -36,12 +36,18 @@ def test_every_law_has_the_numbers_of_its_own_fit(compared, single):
     for name, posterior in single.items():
         row, assessment = table.loc[name], posterior.assess()
         assert row.log_evidence == posterior.log_evidence
+        assert row.log_evidence_error == posterior.log_evidence_error
         assert row.parameters == len(posterior.model.material.parameters)
         assert row.elpd == pytest.approx(leave_one_out(posterior.solution).log_density.sum())
         assert row.discrepancy_share == assessment.share[0]
         assert row.stable == min(assessment.stable.values())
         low, high = posterior.initial_shear_modulus.hdi()
         assert (row.modulus_low, row.modulus_high) == (low, high)
+
+
+def test_an_evidence_in_closed_form_has_no_error_and_not_an_unknown_one():
+    found = tq.fit_laws(DATA, ["neo-hookean"], discrepancy="none", noise_sd=0.02, tolerances="as-tested")
+    assert found.table.log_evidence_error["neo-hookean"] == 0
 
 
 @pytest.mark.slow

@@ -32,7 +32,9 @@ def test_without_errors_the_tests_are_the_closed_form(truth):
     uniaxial, planar = simulated_tests(settings, KNOWN_LAWS[truth], [0])
     for test, power in ((uniaxial, 2), (planar, 3)):
         x = test.stretch
-        assert x.max() <= settings.high
+        assert len(x) == settings.points
+        assert x.max() == settings.high
+        assert x.min() == pytest.approx(settings.low if power == 2 else 1 + 0.25 / settings.points)
         if truth == "gent":
             mu, limit = KNOWN_LAWS["gent"].values
             first = x**2 + (2 / x if power == 2 else 1 + x**-2)
@@ -42,6 +44,13 @@ def test_without_errors_the_tests_are_the_closed_form(truth):
             exponent = -alpha / 2 - 1 if power == 2 else -alpha - 1
             expected = 2 * mu / alpha * (x ** (alpha - 1) - x**exponent)
         assert test.stress == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_tests_in_shear_go_to_the_strain_of_the_others_and_their_errors_vanish_at_rest():
+    settings = StructureStudySettings(modes=("simple-shear",), noise=1e-12)
+    (test,) = simulated_tests(settings, KNOWN_LAWS["ogden"], [0])
+    assert test.stretch.max() == pytest.approx(settings.high - 1, abs=0.02)
+    assert test.stretch.min() == pytest.approx((settings.high - 1) / settings.points, abs=0.02)
 
 
 @pytest.mark.slow

@@ -198,12 +198,10 @@ def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
     model = ensemble.model
     names = f"{model.material.name}, discrepancy {model.discrepancy.name}"
     yield f"tissuq: equally probable draws of the posterior of {names}"
-    if ensemble.origin:
-        yield f"the draws are those of {ensemble.origin}"
+    yield from ensemble_sentences(ensemble)
     yield f"source: {settings.source or model.experiment.name}"
-    yield (
-        "energy of the draws: material and discrepancy" if ensemble[0].discrepancy else "energy of the draws: material"
-    )
+    has_discrepancy = ensemble[0].discrepancy is not None or len(ensemble[0].parts) > 1
+    yield f"energy of the draws: material{' and discrepancy' * has_discrepancy}"
     if ensemble.admissible_in:
         yield (
             f"admissible: stable over the measured range in {', '.join(ensemble.admissible_in)}; "
@@ -220,9 +218,17 @@ def calibrated_stretches(ensemble: Ensemble) -> str:
     return f"calibrated stretches: {', '.join(ends)}; beyond, the card is an extrapolation"
 
 
-def origin_sentences(ensemble: Ensemble) -> tuple[str, ...]:
-    """Return what is to be said of draws that are no fit of measurements; nothing of others."""
-    return (f"The draws are those of {ensemble.origin}.",) if ensemble.origin else ()
+def ensemble_sentences(ensemble: Ensemble) -> Iterator[str]:
+    """Yield that draws are those of no fit of measurements, and what of the fit's stress is in none of them."""
+    if ensemble.origin:
+        yield f"The draws are those of {ensemble.origin}."
+    discrepancy = ensemble.model.discrepancy
+    if discrepancy.is_scattered:
+        yield (
+            f"The scatter S of the discrepancy '{discrepancy.name}' about its mean is in no draw, as it differs from "
+            "measurement to measurement and no energy does: what is computed with the draws spreads less than the "
+            "stress that the fit predicts."
+        )
 
 
 def draw_row(draw: EnergyDraw, settings: CardSettings, modulus: float) -> dict[str, Any]:
@@ -248,7 +254,10 @@ def distances_from_median(ensemble: Ensemble) -> FloatArray:
 
 
 def _parameters(draw: EnergyDraw, settings: CardSettings) -> dict[str, float]:
-    material, values = draw.parts[0]
-    factors = (settings.factor if parameter.unit == "MPa" else 1.0 for parameter in material.parameters)
-    symbols = (parameter.symbol for parameter in material.parameters)
-    return {symbol: value * factor for symbol, value, factor in zip(symbols, values, factors, strict=True)}
+    values: dict[str, float] = {}
+    for number, (material, drawn) in enumerate(draw.parts):
+        for parameter, value in zip(material.parameters, drawn, strict=True):
+            if number == 0 or value:  # of the material whose terms a discrepancy adds, others are zero
+                factor = settings.factor if parameter.unit == "MPa" else 1.0
+                values[parameter.symbol] = values.get(parameter.symbol, 0.0) + value * factor
+    return values

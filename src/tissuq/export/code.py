@@ -20,8 +20,8 @@ from tissuq.export.cards import (
     card_formats,
     draw_row,
     ensemble_lines,
+    ensemble_sentences,
     file_name,
-    origin_sentences,
     words_of,
 )
 from tissuq.export.draw_stresses import DrawStresses
@@ -150,7 +150,7 @@ class FECode(CardFormat):
             files[str(row["file"])] = self.wrapped(self._commented(lines), self.beside(card) + blocks[-1])
             index.append(row)
         sentences = (
-            *origin_sentences(ensemble),
+            *ensemble_sentences(ensemble),
             *judged.sentences(self.name, rivals),
             *fibre_sentences(judged.form, all_constants),
             *_softness(np.array(bulks) / stiffness),

@@ -14,8 +14,8 @@ from tissuq.export.cards import (
     CardSettings,
     draw_row,
     ensemble_lines,
+    ensemble_sentences,
     file_name,
-    origin_sentences,
     words_of,
 )
 from tissuq.export.states import SeenStates, moduli
@@ -56,7 +56,7 @@ class Table(CardFormat):
             row = draw_row(ensemble[draw_index], settings, float(modulus))
             index.append({"file": name, **row})
         note = "The tables are exact: W1 and W2 of material and discrepancy at states whose invariants were measured."
-        return Cards(files, tuple(index), (*origin_sentences(ensemble), note))
+        return Cards(files, tuple(index), (*ensemble_sentences(ensemble), note))
 
 
 def _rows(states: SeenStates, stress: FloatArray) -> FloatArray:

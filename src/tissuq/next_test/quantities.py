@@ -9,7 +9,7 @@ import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.candidates import Stresses, Target
@@ -77,7 +77,13 @@ class QuantityTarget(Target):
         return self.intercept + stresses.mean @ self.weights, np.concatenate([root, error[:, None]], axis=1)
 
 
-def quantity_target(text: str, words: str, states: States, stresses: FloatArray, values: FloatArray) -> QuantityTarget:
+def quantity_target(
+    text: str,
+    words: str,
+    states: Sequence[tuple[str | LoadingMode, FloatArray]],
+    stresses: FloatArray,
+    values: FloatArray,
+) -> QuantityTarget:
     """Return the target that draws of a posterior tell: a regression on principal components of their stresses.
 
     Their number is that which predicts draws best that are left out, one at a time.
@@ -86,7 +92,7 @@ def quantity_target(text: str, words: str, states: States, stresses: FloatArray,
     ----------
     text, words : str
         Its name, and what it is.
-    states : sequence of (LoadingMode, (1,) array)
+    states : sequence of (str or LoadingMode, (1,) array)
     stresses : (N, K) array, MPa
         Of every draw at the states.
     values : (N,) array
@@ -117,4 +123,5 @@ def quantity_target(text: str, words: str, states: States, stresses: FloatArray,
     weights = right_vectors[:used].T @ (scores[:used] / singular[:used])
     intercept, error = float(centre - stresses.mean(axis=0) @ weights), errors[used - 1]
     explained = max(0.0, 1 - error / float(values.var()))
-    return QuantityTarget(text, words, states, weights, intercept, float(np.sqrt(error)), explained)
+    modes_and_points = [(loading_mode(mode), points) for mode, points in states]
+    return QuantityTarget(text, words, modes_and_points, weights, intercept, float(np.sqrt(error)), explained)

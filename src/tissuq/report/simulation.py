@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.export.cards import origin_sentences
+from tissuq.export.cards import ensemble_sentences
 from tissuq.finite_elements.response import respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.solver import CellFields
@@ -282,7 +282,7 @@ def _sections(study: SimulationStudy, bands: Bands) -> tuple[Section, ...]:
     )
     mesh = simulation.case.mesh()
     computed = (
-        *origin_sentences(simulation.ensembles[COMPLETE]),
+        *ensemble_sentences(simulation.ensembles[COMPLETE]),
         f"{draws} draws of the posterior, each stable in every loading mode over the measured range, each a complete "
         f"material including the discrepancy in the energy. Bulk modulus: {settings.bulk_ratio:g} times the draw's "
         "initial shear modulus.",

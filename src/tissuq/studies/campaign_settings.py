@@ -140,7 +140,7 @@ class StructureStudyOptions(Settings):
         ("uniaxial", "planar"), "Loading mode of a test; repeat for more [uniaxial, planar].", name="mode", min_length=1
     )
     low: float = option(0.8, "Smallest stretch of uniaxial tests.", ge=0.3, lt=1)
-    high: float = option(1.25, "Largest stretch of all tests.", gt=1, le=1.3)
+    high: float = option(1.25, "Largest stretch of all tests, or 1 + the largest amount of shear.", gt=1, le=1.3)
     points: int = option(24, "Measurements of a test.", name="measurements", ge=6, le=10_000)
     noise: float = option(0.01, "Noise over the largest stress of a test.", name="noise-share", gt=0, le=0.5)
     estimand: str = option("specimen", "Whose errors of tests are simulated and told to the fits, as of tissuq fit.")

@@ -70,7 +70,7 @@ class StructureStudySettings(StructureStudyOptions):
     modes : tuple of str
         A test in each.
     low, high : float
-        Stretches between which they are made.
+        Stretches between which they are made; amounts of shear are up to ``high - 1``.
     points : int
         Of every test.
     noise : float
@@ -156,19 +156,24 @@ def simulated_tests(settings: StructureStudySettings, truth: KnownLaw, seed: lis
     tests = []
     for mode in settings.modes:
         loading = loading_mode(mode)
-        low = max(settings.low, 1.0) if mode != "uniaxial" else settings.low
-        stretch = np.linspace(low, settings.high, settings.points + 1)
-        stretch = stretch[np.abs(stretch - 1) > 1e-6][: settings.points]
-        stress = engineering_stress(law, loading.paths[0], stretch, np.array([truth.values]))[0]
+        strain = _strains(settings.low if mode == "uniaxial" else 1.0, settings.high, settings.points)
+        control = loading.excursion(strain)
+        stress = engineering_stress(law, loading.paths[0], control, np.array([truth.values]))[0]
         largest = float(np.abs(stress).max())
-        measured = stress * specimen * _factor(generator, sizes, "test") * _smooth(generator, sizes, stretch)
+        measured = stress * specimen * _factor(generator, sizes, "test") * _smooth(generator, sizes, control)
         scatter = np.hypot(settings.noise, sizes.get("resolution", 0.0)) * largest
         measured = measured + sizes.get("zero", 0.0) * generator.standard_normal()
-        measured = measured + scatter * generator.standard_normal(len(stretch))
-        recorded = 1 + (stretch - 1) * _factor(generator, sizes, "length")
+        measured = measured + scatter * generator.standard_normal(len(control))
+        recorded = loading.excursion(strain * _factor(generator, sizes, "length"))
         recorded = recorded + sizes.get("slack", 0.0) * generator.standard_normal()
         tests.append(Experiment(loading, recorded, measured).labelled(name=mode, specimen="simulated"))
     return tests
+
+
+def _strains(low: float, high: float, count: int) -> FloatArray:
+    """Return so many changes of a control, up to those of both stretches, without the one nearest to rest."""
+    strain = np.linspace(low, high, count + 1) - 1
+    return np.delete(strain, np.abs(strain).argmin())
 
 
 def _factor(generator: np.random.Generator, sizes: Mapping[str, float], name: str) -> float:
