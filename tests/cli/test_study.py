@@ -124,7 +124,8 @@ def test_structures_write_bands_and_go_on(cli, here):
 @pytest.mark.parametrize(
     ("more", "words"),
     [(["--truth", "iron"], "no law 'iron'"), (["--structure", "bridge"], "no structure 'bridge'"),
-     (["--mode", "biaxial"], "several controls"), (["--estimand", "all"], "estimand")],
+     (["--mode", "biaxial"], "several controls"), (["--mode", "simple-shear-normal"], "or stresses"),
+     (["--estimand", "all"], "estimand")],
 )  # fmt: skip
 def test_structures_that_are_not_known_are_refused(cli, here, more, words):
     said = cli("study", "structures", *more)

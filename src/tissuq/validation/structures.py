@@ -53,9 +53,10 @@ STRUCTURES: dict[str, Case] = {
 """Structures by name, with meshes that are the same for the truth: errors of a mesh have no part in coverage."""
 
 
-def _with_one_control(name: str) -> None:
-    if len(loading_mode(name).controls) > 1:
-        raise ModelError(f"the mode {name!r} has several controls; choose among those with one")
+def _with_one_stress(name: str) -> None:
+    mode = loading_mode(name)
+    if len(mode.controls) > 1 or len(mode.stresses) > 1:
+        raise ModelError(f"the mode {name!r} has several controls or stresses; choose among those with one")
 
 
 class StructureStudySettings(StructureStudyOptions):
@@ -85,7 +86,7 @@ class StructureStudySettings(StructureStudyOptions):
     _once = field_validator("truths", "structures")(each_once)
     _known_truths = field_validator("truths")(names_among(KNOWN_LAWS, "law"))
     _known_structures = field_validator("structures")(names_among(STRUCTURES, "structure"))
-    _known_modes = field_validator("modes")(there_is(_with_one_control))
+    _known_modes = field_validator("modes")(there_is(_with_one_stress))
     _known_estimand = field_validator("estimand")(there_is(Tolerances))
 
     @property
