@@ -100,7 +100,7 @@ def answer_of_population(
         return PopulationEstimate(name, times * middle, times * low, times * high, unit_name)
 
     estimates = (
-        estimate(f"{words} of a new specimen{patient_in_words(population)}", "new patient", unit.name),
+        estimate(f"{words} of a new specimen{patient_in_words(population)}", "new specimen", unit.name),
         estimate(f"{words}, median of the population", "median", unit.name),
         estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
     )
