@@ -168,7 +168,7 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
         (["tests/b.csv", "--noise-sd", "0,5"], ["has 2 numbers, 0 and 5", "a decimal point and no comma"]),
         (
             ["tests/b.csv", "--column", "stress=1", "--column", "stress=2"],
-            ["tests/b.csv: --column is given for 'stress'"],
+            ["tests/b.csv: --column is given twice for 'stress', and there"],
         ),
         (["tests/b.csv", "--tolerance", "stress"], ["'stress' is not a tolerance; write stress=10%"]),
         (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is not a tolerance"]),

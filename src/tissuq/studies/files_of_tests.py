@@ -152,7 +152,7 @@ def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) ->
         here = [name for name in names if has(file, role, name)]
         if len(here) > 1:
             listed = " and ".join(f"'{name}'" for name in here)
-            raise InputError(f"{file}: --column is given for '{role}' as {listed}, which are both there; give one.")
+            raise InputError(f"{file}: --column is given twice for '{role}', and there are {listed}; give it once.")
         if here:
             columns[role] = here[0]
         elif any(has(other, role, name) for other in files for name in names):
