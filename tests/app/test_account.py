@@ -65,6 +65,26 @@ def test_columns_are_said_of_the_file_that_has_them_and_the_other_is_read_by_its
     assert highest[1] == pytest.approx(2 * highest[0], rel=1e-3)
 
 
+def test_two_files_whose_columns_have_other_names_are_both_mended(here, write_stretches):
+    files, modes, reading = ["a.csv", "b.csv"], ["uniaxial"] * 2, {}
+    for name, c10 in zip("ab", (5.0, 10.0), strict=True):
+        write_stretches(here, f"{name}.csv", heading=f"{name} 1,{name} 2", c10=c10)
+    for label in (
+        "stress is in column 'a 2",
+        "stretch is in column 'a 1",
+        "stress is in column 'b 2",
+        "stretch is in column 'b 1",
+    ):
+        error = account(files, reading, modes)["error"]
+        assert error["file"] == label[-3] + ".csv"
+        reading |= next(answer["settings"] for answer in error["answers"] if answer["label"].startswith(label))
+    found = account(files, reading, modes)
+    assert found["error"] is None
+    assert [max(test["curves"][0]["used"]["y"]) for test in found["tests"]] == pytest.approx([10.56, 21.06], rel=0.02)
+    (other,) = account(files[1:], reading, modes[1:])["tests"]
+    assert other["roles"] == {"b 1": "stretch", "b 2": "stress"}
+
+
 def test_a_stress_whose_type_is_open_is_asked_about_without_the_name_of_an_option(here, write_stretches):
     write_stretches(here, heading="stretch,sigma [kPa]")
     error = account(["kidney.csv"], {}, ["uniaxial"])["error"]

@@ -336,13 +336,57 @@ def test_a_fit_that_is_cancelled_or_whose_page_is_closed_leaves_nothing(visit, s
 
 
 @pytest.mark.slow
+def test_a_page_that_is_loaded_again_goes_on_where_it_was(visit, tmp_path, write_stretches):
+    page = visit()
+    upload(page, write_stretches(tmp_path))
+    page.evaluate("document.getElementById('stable').checked = true")
+    page.click("#fit-button")
+    page.get_by_text("fitting, discrepancy auto").wait_for()
+    page.reload()
+    page.wait_for_selector("#report iframe")
+    assert number_of(page)[1] < 10 < number_of(page)[2]
+    page.goto("about:blank")
+    page.go_back()
+    page.wait_for_selector("#report iframe")
+    page.wait_for_selector("#tests .plot")
+    assert page.inner_text("#file-list .name") == "kidney.csv"
+    assert page.is_checked("#stable")
+    sync_api.expect(page.locator("#stale")).to_be_hidden()
+
+
+@pytest.mark.slow
+def test_a_page_that_was_away_for_too_long_says_that_its_files_are_deleted(visit, tmp_path, write_stretches):
+    page = visit()
+    upload(page, write_stretches(tmp_path))
+    page.evaluate("addEventListener('pagehide', () => sessionStorage.setItem('tissuq', sessionStorage.getItem('tissuq')"
+                  ".replace(/\"session\":\"[^\"]*\"/, '\"session\":\"gone\"')))")  # fmt: skip
+    page.reload()
+    sync_api.expect(page.locator("#alert")).to_contain_text("away for too long, and its files are deleted")
+    assert page.locator("#file-list .name").count() == 0
+
+
+@pytest.mark.slow
+def test_columns_of_two_files_with_other_names_are_chosen_by_clicking(visit, tmp_path, write_stretches):
+    page = visit()
+    files = [write_stretches(tmp_path, f"{name}.csv", f"{name} 1,{name} 2", c10) for name, c10 in (("a", 5), ("b", 6))]
+    upload(page, *files)
+    page.evaluate("document.getElementById('mend').open = true")
+    for name in ("a", "b"):
+        for number, role in ((1, "stretch"), (2, "stress")):
+            page.select_option(f'select[name="column {name} {number}"]', role)
+            page.wait_for_selector("#understood:not([aria-busy])")
+    page.wait_for_function("document.querySelectorAll('#tests .plot').length === 2")
+    assert "--column 'stretch=a 1' --column 'stretch=b 1'" in page.locator("#inspect-repeat").text_content()
+
+
+@pytest.mark.slow
 def test_files_chosen_before_the_page_has_its_session_are_not_lost(browser, address, tmp_path):
     path = tmp_path / "first.csv"
     path.write_text("stretch,stress_kPa\n" + "".join(f"{1 + k / 50},{k}\n" for k in range(12)))
     page = browser.new_page()
     page.set_default_timeout(PATIENCE)
     held = []
-    page.route("**/sessions", lambda route: held.append(route))
+    page.route("**/sessions?*", lambda route: held.append(route))
     page.goto(address)
     page.wait_for_function("document.getElementById('pick') !== null")
     page.set_input_files("#pick", path)

@@ -90,6 +90,20 @@ def test_a_page_that_comes_back_soon_finds_its_session_and_what_it_missed(tmp_pa
     run_with(check, tmp_path, grace=0.1)
 
 
+def test_a_page_that_is_loaded_again_takes_up_its_session_and_another_tab_does_not(tmp_path):
+    async def check(sessions, workers):
+        session = sessions.new()
+        sessions.listen(session)
+        assert await sessions.taken_up(session.name) is None
+        sessions.leave(session)
+        assert await sessions.taken_up(session.name) is session
+        await asyncio.sleep(0.1)
+        assert session.folder.exists()
+        assert await sessions.taken_up("another") is None
+
+    run_with(check, tmp_path)
+
+
 def test_a_task_that_is_stopped_says_so_and_the_session_goes_on(tmp_path):
     async def check(sessions, workers):
         session = sessions.new()

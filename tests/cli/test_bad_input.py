@@ -90,7 +90,7 @@ CONFIGS = {
 
 PAPER = [
     (["--points", "5"], ["points", "6", "5"]),
-    (["--measurements", "12.5"], ["--measurements", "integer"]),
+    (["--measurements", "12.5"], ["--measurements", "whole number"]),
     (["--stretch-range", "0.5"], ["--stretch-range", "LOW:HIGH", "'0.5'"]),
     (["--stretch-range", "low:high"], ["--stretch-range", "LOW:HIGH"]),
     (["--stretch-range", "2:1"], ["the smallest stretch, 2", "the largest, 1 (--stretch-range)"]),

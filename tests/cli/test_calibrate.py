@@ -264,6 +264,18 @@ def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the
     assert "kPa, 95 % interval" in said.out
 
 
+@pytest.mark.parametrize(("force", "is_refused"), [("mN", True), ("N", False)])
+def test_forces_and_depths_that_go_with_another_unit_than_the_law_are_refused(cli, here, force, is_refused):
+    (here / "punch.py").write_text("def force(parameters, depth):\n    return 16 * parameters['C10'] * depth\n")
+    rows = "".join(f"{depth / 10},{16 * 1.5 * depth / 10}\n" for depth in range(1, 13))
+    (here / "punch.csv").write_text(f"depth (mm),force ({force})\n{rows}")
+    usual = ["calibrate", "punch.csv", "--forward", "punch.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
+    said = cli(*usual, "--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2")
+    assert said.status == (2 if is_refused else 0), said.err
+    words = "the forces are in mN and the controls in mm, and the parameters of neo-hookean would be taken in MPa"
+    assert (words in said.err and "--unit kPa or --unit MPa" in said.err) == is_refused
+
+
 @pytest.mark.parametrize(("unit", "status"), [("mmHg", 2), ("MPa", 0)])
 def test_pressures_in_another_unit_than_the_law_are_refused(cli, here, unit, status):
     write_cube(here, f"pressure ({unit})")

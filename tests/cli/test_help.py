@@ -67,7 +67,8 @@ def test_the_former_name_of_structure_still_runs_it_and_is_not_listed(cli):
     [
         (["papr"], ["No such command", "papr"]),
         (["paper", "--pionts", "12"], ["No such option", "--pionts"]),
-        (["paper", "--measurements", "many"], ["--measurements", "integer"]),
+        (["paper", "--measurements", "many"], ["tissuq: --measurements needs a whole number, not 'many'."]),
+        (["fit", "a.csv", "--axial-stretch", "1,2"], ["tissuq: --axial-stretch needs a number, with a decimal point"]),
         (["paper", "--measurements"], ["--measurements", "requires an argument"]),
         (["paper", "stray.csv"], ["stray.csv"]),
         (["show"], ["Missing argument"]),
@@ -79,6 +80,15 @@ def test_a_usage_error_ends_with_status_2_and_names_what_is_wrong(cli, here, arg
     assert "Traceback" not in said.err
     assert all(word in said.err for word in words)
     assert not list(here.iterdir())
+
+
+def test_output_that_nobody_reads_any_more_ends_the_command_without_a_word():
+    for name in ("materials", "modes"):
+        program = [sys.executable, "-c", "from tissuq.cli import main; main()", name]
+        command = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        command.stdout.close()
+        assert command.stderr.read() == b""
+        assert command.wait() == 141
 
 
 def test_ctrl_c_ends_with_status_130_and_leaves_nothing(cli, here, specimen, monkeypatch):

@@ -84,7 +84,7 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
     details = " ".join(run_in(folder, "show", "run", "--details").out.split())
     assert "By itself (no pooling): only the data of the specimen." in details
     contents = json.loads(run_in(folder, "show", "run", "--json").out)
-    patient = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
+    patient = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new specimen")
     headline = contents["result"]["numbers"][0]
     assert headline["name"] == "initial shear modulus of a new specimen"
     for name, end in (("value", "median"), ("low", "hdi_low"), ("high", "hdi_high")):
@@ -107,7 +107,7 @@ def test_show_prints_what_the_command_printed_and_details_all_else(population_ru
 @pytest.mark.slow
 def test_predictions_and_cards_start_from_a_new_patient(population_run):
     folder, _ = population_run
-    row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
+    row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new specimen")
     patient = tq.load(folder / "run")
     assert float(patient.summary().loc["C10", "median"]) == pytest.approx(float(row["median"]), rel=0.02)
     uses = json.loads((folder / "run" / "result.json").read_text())["uses"]
@@ -138,7 +138,7 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     assert said.status == 0, said.err
     assert "those of a new specimen of the population of 6 specimens" in " ".join(said.out.split())
     forces = np.array([float(row["force"]) for row in table(tmp_path / "forces" / "draws.csv")])
-    row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
+    row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new specimen")
     assert np.median(forces) == pytest.approx(float(row["median"]), rel=0.05)
     inside = (forces > float(row["hdi_low"])) & (forces < float(row["hdi_high"]))
     assert 0.85 <= inside.mean() < 1
@@ -160,8 +160,8 @@ def test_the_numbers_are_those_of_the_specimens(population_run):
     found = {row["quantity"]: {key: float(row[key]) for key in ("median", "hdi_low", "hdi_high")}
              for row in table(folder / "run" / "population.csv")}  # fmt: skip
     assert found["median"]["median"] == pytest.approx(np.exp(np.mean(np.log(MODULI_KPA))), rel=0.05)
-    assert found["new patient"]["hdi_low"] < 40
-    assert found["new patient"]["hdi_high"] > 75
+    assert found["new specimen"]["hdi_low"] < 40
+    assert found["new specimen"]["hdi_high"] > 75
     assert 0.1 < found["spread"]["median"] < 0.6  # of the logarithm, which has no unit
     shown = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["numbers"][2]
     assert shown["name"] == "spread between specimens, as a factor"
@@ -343,10 +343,10 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
         assert shown == pytest.approx(float(row[name]), abs=0.02 * width)  # as exact as the interval is wide
     needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
     assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
-    assert needed["new patient"]["specimens"] == ""
+    assert needed["new specimen"]["specimens"] == ""
     assert "Specimens like these for ± 8 %" in text
     assert "not reached: specimens differ more" in text
-    patient = next(row for row in table(here / "run" / "population.csv") if row["quantity"] == "new patient")
+    patient = next(row for row in table(here / "run" / "population.csv") if row["quantity"] == "new specimen")
     assert float(patient["median"]) == pytest.approx(
         np.exp(np.polyval(np.polyfit(AGES, np.log(MODULI_KPA), 1), 80)), 0.1
     )

@@ -160,8 +160,16 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
             ["tests/b.csv", "tests/uniaxial.csv", "--mode", "planar", "--mode", "planar", "--mode", "planar"],
             ["3 times"],
         ),
-        (["tests/b.csv", "tests/uniaxial.csv", "--noise-sd", "1,2,3"], ["--noise-sd is given 3 times for 2 files"]),
-        (["tests/b.csv", "--noise-sd", "1,2"], ["--noise-sd is given 2 times for one test"]),
+        (
+            ["tests/b.csv", "tests/uniaxial.csv", "--noise-sd", "1,2,3"],
+            ["--noise-sd has 3 numbers, 1 and 2 and 3, for 2 files; give it once for each"],
+        ),
+        (["tests/b.csv", "--noise-sd", "1,2"], ["--noise-sd has 2 numbers, 1 and 2, for one test"]),
+        (["tests/b.csv", "--noise-sd", "0,5"], ["has 2 numbers, 0 and 5", "a decimal point and no comma"]),
+        (
+            ["tests/b.csv", "--column", "stress=1", "--column", "stress=2"],
+            ["tests/b.csv: --column is given twice for 'stress', and there"],
+        ),
         (["tests/b.csv", "--tolerance", "stress"], ["'stress' is not a tolerance; write stress=10%"]),
         (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is not a tolerance"]),
         (["tests/b.csv", "--tolerance", "stress=1%", "--tolerance", "stress=2%"], ["given twice for 'stress'"]),

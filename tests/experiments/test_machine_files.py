@@ -53,7 +53,7 @@ def test_one_part_of_a_cross_section_may_be_given_and_the_other_stated(tmp_path)
     ("dimensions", "words"),
     [
         ({"length": "10 mm"}, 'undeformed cross-section: area (--area "10 mm2"), or width and thickness'),
-        ({"length": "10 mm", "width": "5 mm"}, "Known is only the width"),
+        ({"length": "10 mm", "width": "5 mm"}, "The width is known, so that the thickness is enough"),
         ({"area": "6 mm2"}, 'give the undeformed length (--length "20 mm"'),
         ({"area": "6 mm2", "length": "20"}, "the length '20' has no unit"),
         ({"area": "6 mm2", "length": "20 s"}, "'s' is not a unit of length; write one of mm, cm"),

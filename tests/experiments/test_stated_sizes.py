@@ -134,7 +134,7 @@ def test_a_column_of_sizes_holds_one_number(tmp_path):
     for text in (filled, first_only):
         np.testing.assert_allclose(tq.read(written(tmp_path, names + text)).stress, STRESS, rtol=1e-6, atol=1e-9)
     current = rows(LENGTH * (STRETCH - 1), forces(5), STRETCH * 0 + 20, 5 * STRETCH**-0.5, STRETCH * 0 + 2)
-    with pytest.raises(InputError, match="Known is only the thickness"):
+    with pytest.raises(InputError, match="The thickness is known, so that the width is enough"):
         tq.read(written(tmp_path, names + current))
 
 

@@ -202,3 +202,21 @@ def test_a_torque_beside_the_stress_raises_a_note_until_the_type_of_stress_is_sa
     path.write_text(f"Shear strain (%),Shear stress (Pa),Torque (mN m)\n{rows}")
     warnings = tq.inspect(path, mode="simple-shear", stress_type=stress_type).warnings
     assert any("--stress-type torsion, which corrects it" in text for text in warnings) is (stress_type is None)
+
+
+@pytest.mark.parametrize(
+    ("head", "is_disc"),
+    [
+        ("Geometry name\t20.0mm parallel plate, Peltier plate Stainless steel", True),
+        ("Measuring System:\tPP25", True),
+        ("Measuring System:\tcouette CC27", False),
+        ("Supply\tPP25.4", False),
+    ],
+)
+def test_a_disc_that_is_named_above_a_shear_stress_raises_the_note_without_a_torque(tmp_path, head, is_disc):
+    rows = "".join(f"{g:.2f}\t{10 * g:.4f}\n" for g in np.linspace(1, 50, 30))
+    (tmp_path / "shear.txt").write_text(f"{head}\nSample\tliver 3\nShear strain\tShear stress\n%\tPa\n{rows}")
+    warnings = tq.inspect(tmp_path / "shear.txt", mode="simple-shear").warnings
+    seen = [text for text in warnings if "--stress-type torsion, which corrects it" in text]
+    assert len(seen) == is_disc
+    assert all(f"line 1 says '{' '.join(head.split())}'" in text for text in seen)

@@ -12,6 +12,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading import workbooks
 from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 from tissuq.experiments.reading.inspection import inspect
+from tissuq.experiments.reading.tests_in_file import read_tests
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
 
@@ -134,3 +135,40 @@ def test_a_stray_cell_beside_the_data_is_told(tmp_path):
     book.active["XFD10"] = 7
     book.save(tmp_path / "stray.xlsx")
     assert "line 10 has 16384 cells" in message(tmp_path / "stray.xlsx")
+
+
+def test_a_workbook_kept_by_hand_is_read_with_the_sizes_of_each_specimen(tmp_path):
+    """A sheet of sizes, then specimens beside one another under merged names, with a remark between the rows."""
+    book = openpyxl.Workbook()
+    sizes = book.active
+    sizes.title = "Übersicht"
+    for row in (
+        ["Probe", "Breite (mm)", "Dicke (mm)", "Länge (mm)"],
+        ["P1", 5, 2, 20],
+        ["P2", 5.2, 2.1, 25],
+        ["Mittel", 5, 2, 20],
+    ):
+        sizes.append(row)
+    sheet = book.create_sheet("Daten")
+    for row in (
+        ["Zugversuch"],
+        [],
+        ["Probe P1", None, None, "Probe P2"],
+        ["Weg", "Kraft", None, "Weg", "Kraft"],
+        ["mm", "N", None, "mm", "N"],
+    ):
+        sheet.append(row)
+    stretch = np.linspace(1, 1.3, 30)
+    stress = 0.04 * (stretch - stretch**-2)
+    for number, (x, y) in enumerate(zip(stretch, stress, strict=True)):
+        sheet.append([20 * (x - 1), y * 10, None, 25 * (x - 1), 1.1 * y * 5.2 * 2.1])
+        if number == 12:
+            sheet.append(["Klemme nachgezogen"])
+    book.save(tmp_path / "book.xlsx")
+    with pytest.raises(InputError, match=r"sheet 'Daten', line 19, .*'Klemme nachgezogen' is not a number"):
+        read_tests(tmp_path / "book.xlsx")
+    with pytest.warns(UserWarning, match="'Übersicht' is left out"):
+        tests = read_tests(tmp_path / "book.xlsx", leave_out="19")
+    for test, factor in zip(tests, (1.0, 1.1), strict=True):
+        np.testing.assert_allclose(test.stretch, stretch, rtol=1e-9)
+        np.testing.assert_allclose(test.stress, factor * stress, rtol=1e-9, atol=1e-12)

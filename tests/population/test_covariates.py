@@ -91,6 +91,8 @@ def test_a_new_patient_has_the_covariates_that_are_given(found, tmp_path):
     np.testing.assert_allclose((old.new / young.new)[..., 0], factor, rtol=1e-9)
     np.testing.assert_array_equal(found.given({"age": float(np.mean(AGES))}).new, found.new)
     np.testing.assert_array_equal(old.median, found.median)
+    assert f"median of the population ({found.covariates.described({})})" in str(old.answer)
+    assert "new specimen (age 65 year)" in str(old.answer)
     band = found.new_patient([1.2], covariates={"age": 65}, discrepancy=False)
     assert band["median"][0] == pytest.approx(2 * (1.2 - 1.2**-2) * np.median(old.new), rel=1e-6)
     old.patient.save(tmp_path / "patient.nc")

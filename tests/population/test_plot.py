@@ -85,7 +85,7 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
     rows = {
         "median": [0.5, 0.4, 0.6],
         "spread": [1, 0.5, 2],
-        "new patient": [0.5, 0.1, 9],
+        "new specimen": [0.5, 0.1, 9],
         "complete pooling": [0.5, 0.499, 0.501],
     }
     axis = drawn_axis(rows, {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.45, "stiff": 30.0}, 0.1, "MPa")
@@ -101,7 +101,7 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
 
 
 def test_specimens_that_differ_by_orders_of_magnitude_are_on_a_logarithmic_axis():
-    rows = {name: [5.0, 0.1, 200.0] for name in ("median", "spread", "new patient", "complete pooling")}
+    rows = {name: [5.0, 0.1, 200.0] for name in ("median", "spread", "new specimen", "complete pooling")}
     axis = drawn_axis(rows, {f"S{m}": m for m in (0.2, 0.9, 3.1, 10.0, 41.0, 160.0)}, 0.01, "kPa")
     low, high = axis.get_xlim()
     assert axis.get_xscale() == "log"

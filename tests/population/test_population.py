@@ -202,7 +202,7 @@ def test_a_correlation_is_found():
 
 def test_a_new_patient_is_as_different_as_the_specimens(found):
     table = found.summary().loc["C10"]
-    new, complete = table.loc["new patient"], table.loc["complete pooling"]
+    new, complete = table.loc["new specimen"], table.loc["complete pooling"]
     assert new["hdi_low"] < 0.15
     assert new["hdi_high"] > 0.9
     assert complete["hdi_high"] - complete["hdi_low"] < 0.1

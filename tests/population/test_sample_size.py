@@ -34,15 +34,15 @@ def test_what_is_then_known_of_exact_specimens_is_students_t(count):
 @pytest.mark.slow
 def test_what_is_known_now_is_what_was_sampled_and_more_specimens_for_a_narrower_median(found):
     tables = {aim: found.specimens_needed(aim).loc["C10"] for aim in (0.3, 1.0, 5.0)}
-    for quantity, draws in (("median", found.median), ("new patient", found.new)):
+    for quantity, draws in (("median", found.median), ("new specimen", found.new)):
         low, high = np.log(np.quantile(draws, [0.025, 0.975]))
         assert tables[1.0].loc[quantity, "now"] == pytest.approx(np.sinh((high - low) / 2), rel=0.1)
     needed = [table.loc["median", "specimens"] for table in tables.values()]
     assert needed[0] > 20
     assert needed[1:] == [6, 6]
-    assert np.isnan(tables[1.0].loc["new patient", "specimens"])
-    assert tables[1.0].loc["new patient", "floor"] > 1
-    assert tables[5.0].loc["new patient", "more"] == 0
+    assert np.isnan(tables[1.0].loc["new specimen", "specimens"])
+    assert tables[1.0].loc["new specimen", "floor"] > 1
+    assert tables[5.0].loc["new specimen", "more"] == 0
     for aim in (0, -1, np.nan):
         with pytest.raises(tq.InputError, match="aim must be a positive half width over the median"):
             found.specimens_needed(aim)

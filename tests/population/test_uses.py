@@ -145,7 +145,7 @@ def test_the_answer_in_python_has_the_numbers_of_the_summary_and_the_uses_of_the
     answer = alike.answer
     new, median, spread = answer.estimates
     table = alike.summary(unit="MPa")
-    for estimate, quantity in ((new, "new patient"), (median, "median")):
+    for estimate, quantity in ((new, "new specimen"), (median, "median")):
         expected = [2 * table.loc[("C10", quantity), end] for end in ("median", "hdi_low", "hdi_high")]  # mu = 2 C10
         assert estimate[1:4] == pytest.approx(expected, rel=1e-9)
         assert estimate.unit == "MPa"

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument, option, options_of
-from tissuq.studies.option_texts import pairs_of, priors, range_of, tolerances
+from tissuq.studies.option_texts import columns_by_role, pairs_of, priors, range_of, tolerances
 from tissuq.studies.settings import load_settings
 
 
@@ -64,6 +64,7 @@ def test_a_message_names_the_option_as_it_was_typed():
     [
         (pairs_of("--size", "a size", "NAME=VALUE", float), ["a = 1", "b=2"], {"a": 1.0, "b": 2.0}),
         (pairs_of("--only", "a row", "COLUMN=VALUE", divided_last=True), ["a=b=c"], {"a=b": "c"}),
+        (columns_by_role, ["stress=P", "strain=2", "stress=Q=1"], {"stress": ["P", "Q=1"], "strain": 2}),
         (range_of("--stretch", "1:2"), "0.7:1.3", (0.7, 1.3)),
         (tolerances, ["stress=10%", "slack=0.01"], {"stress": 0.1, "slack": 0.01}),
         (tolerances, ["none"], {}),

@@ -63,8 +63,10 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
     """
     paths = list(map(Path, files))
     tables = {file: list(map(_table, tables_of(Path(file), reading))) for file in files}
-    columns = list(dict.fromkeys(column["name"] for of_file in tables.values() for table in of_file
-                                 for column in table["columns"]))  # fmt: skip
+    columns = {
+        file: list(dict.fromkeys(column["name"] for table in of_file for column in table["columns"]))
+        for file, of_file in tables.items()
+    }
     record: dict[str, Any] = {"tables": tables, "text": "", "tests": [], "findings": [], "questions": [], "error": None}
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path, mode in zip(paths, modes, strict=True):
@@ -72,23 +74,23 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
             tests += find_tests(path, {**reading, "mode": mode}, paths)
         except TissuqError as refusal:
             settings, start = {**reading, "mode": mode}, perf_counter()
-            doubt = _question(path, str(refusal), columns, settings, paths, start, refused=True)
+            doubt = _question(path, str(refusal), columns[str(path)], settings, paths, start, refused=True)
             record["error"] = doubt | {"file": str(path)}
             break
     start = perf_counter()
     if tests and not record["error"]:
         inspections = [Inspection.of(of_test) for _, of_test in tests]
         record["text"] = str(inspections[0]) if len(tests) == 1 else overview(inspections)
-        pairs = zip(tests, inspections, strict=True)
+        pairs = list(zip(tests, inspections, strict=True))
         record["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
-        texts = dict.fromkeys(text for inspection in inspections for text in inspection.warnings)
-        record["findings"] = [_finding(text, columns, reading) for text in texts]
+        texts = {text: str(settings["file"]) for (settings, _), inspection in pairs for text in inspection.warnings}
+        record["findings"] = [_finding(text, columns[file], reading) for text, file in texts.items()]
         stated = dict(zip(files, modes, strict=True))
         for settings, of_test in tests:
             path, mode = Path(settings["file"]), stated.get(str(settings["file"]))
             for text in of_test.doubts:
                 if text not in [question["text"] for question in record["questions"]]:
-                    doubt = _question(path, text, columns, {**reading, "mode": mode}, paths, start)
+                    doubt = _question(path, text, columns[str(path)], {**reading, "mode": mode}, paths, start)
                     record["questions"] += [doubt | {"file": str(path)}] if doubt["answers"] else []
         silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
         if silent:
@@ -173,7 +175,7 @@ def _points(stretch: Column, stress: Column, unit: Any) -> dict[str, list[float]
 def _finding(text: str, columns: Sequence[str], reading: Mapping[str, Any]) -> dict[str, Any]:
     """Return something strange about measurements with what it proposes, which a person may take or not."""
     answers = [
-        {"label": _in_words(proposal), "settings": _changes(reading, with_options(reading, proposal))}
+        {"label": _in_words(proposal), "settings": _changes(reading, with_options(reading, proposal, columns))}
         for proposal in answers_in(text, columns, reading)
         if not proposal.asked_for and not proposal.leaves_out
     ]
@@ -197,13 +199,13 @@ def _question(
     later: list[dict[str, Any]] = []
     for proposal in answers_in(text, columns, settings):
         answer: dict[str, Any] = {"label": _in_words(proposal), "gives": "", "asked_for": list(proposal.asked_for)}
-        answer["settings"] = _changes(settings, with_options(settings, proposal))
+        answer["settings"] = _changes(settings, with_options(settings, proposal, columns))
         if proposal.asked_for:
             answers.append(answer)
             continue
         if perf_counter() - start < SECONDS_TO_TRY:
             try:
-                tests = find_tests(file, with_options(settings, proposal), files)
+                tests = find_tests(file, with_options(settings, proposal, columns), files)
                 answer["gives"] = tests_in_words(tests)
             except TissuqError as refusal:
                 if str(refusal) == text or not refused:

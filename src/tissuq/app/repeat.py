@@ -8,6 +8,7 @@ from typing import Any
 
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of
+from tissuq.studies.option_texts import columns_in
 
 Repeat = dict[str, str]
 """A ``shell`` command and lines of ``python``."""
@@ -51,7 +52,8 @@ def reading_words(reading: Mapping[str, Any]) -> list[str]:
         if isinstance(value, bool):
             words += [slot.typed] if value else [f"--{slot.option.negative}"] * bool(slot.option.negative)
         elif isinstance(value, Mapping):
-            words += [word for key, item in value.items() for word in (slot.typed, f"{key}={item}")]
+            pairs = [(key, item) for key, items in value.items() for item in columns_in(items)]
+            words += [word for key, item in pairs for word in (slot.typed, f"{key}={item}")]
         elif isinstance(value, tuple | list):
             words += [slot.typed, ":".join(f"{end:.12g}" for end in value)]
         elif value is not None:

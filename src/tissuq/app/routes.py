@@ -41,7 +41,6 @@ def routes(sessions: Sessions) -> list[Route]:
         Route("/", _static("page.html")),
         *(Route(f"/{path.name}", _static(path.name)) for path in sorted(STATIC.iterdir()) if path.suffix in TYPES),
         Route("/sessions", _checked(_new, sessions), methods=["POST"]),
-        Route(f"{of_session}/end", _checked(_end, sessions), methods=["POST"]),
         Route(f"{of_session}/news", _checked(_news, sessions)),
         Route(f"{of_session}/files", _checked(_upload, sessions), methods=["POST"]),
         Route(f"{of_session}/files/{{name}}", _checked(_remove, sessions), methods=["DELETE"]),
@@ -75,14 +74,10 @@ def _session(request: Request, sessions: Sessions) -> Session:
     return sessions.named(request.path_params["session"])
 
 
-async def _new(_: Request, sessions: Sessions) -> Response:
+async def _new(request: Request, sessions: Sessions) -> Response:
+    session = await sessions.taken_up(request.query_params.get("again", "")) or sessions.new()
     limit = {"bytes": MAX_FILE, "words": f"{MAX_FILE // MEGABYTE} MB"}
-    return JSONResponse({"session": sessions.new().name, "limit": limit})
-
-
-async def _end(request: Request, sessions: Sessions) -> Response:
-    sessions.end(_session(request, sessions))
-    return JSONResponse({})
+    return JSONResponse({"session": session.name, "files": session.files, "limit": limit})
 
 
 async def _upload(request: Request, sessions: Sessions) -> Response:

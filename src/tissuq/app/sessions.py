@@ -17,11 +17,13 @@ from tissuq.app.workers import News, Workers
 from tissuq.errors import InputError
 from tissuq.studies.settings import is_inside
 
-GRACE = 15.0
+GRACE = 60.0
 """Seconds after which a session ends whose page has gone."""
 MAX_SESSIONS = 50
 FIRST_SIGN = 60.0
 """Seconds within which a new session's page must listen."""
+LEAVING = 1.0
+"""Seconds within which a page that is loaded again is noticed to have gone."""
 SHOWN = 200
 """Letters of a name in a message."""
 MEGABYTE = 1_000_000
@@ -146,6 +148,17 @@ class Sessions:
         folder.mkdir(mode=0o700)
         session = self._by_name[name] = Session(name, folder)
         self._end_in(session, FIRST_SIGN)
+        return session
+
+    async def taken_up(self, name: str) -> Session | None:
+        """Return the session of a page that was loaded again; None where it has ended, or another tab has it."""
+        end = asyncio.get_running_loop().time() + LEAVING
+        while (session := self._by_name.get(name)) and session.listeners:
+            if asyncio.get_running_loop().time() > end:
+                return None
+            await asyncio.sleep(LEAVING / 20)
+        if session:
+            self._end_in(session, FIRST_SIGN)
         return session
 
     def named(self, name: str) -> Session:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 from tissuq.app.repeat import command, fit_lines, reading_words
 from tissuq.errors import InputError
 from tissuq.studies.files_of_tests import measured, reading_of, run_name
-from tissuq.studies.option_texts import column
+from tissuq.studies.option_texts import column, columns_in, one_or_list
 
 if TYPE_CHECKING:
     from tissuq.report.result import Result
@@ -216,7 +216,8 @@ def _files(request: Mapping[str, Any]) -> tuple[list[str], list[str], dict[str, 
     """Return the files of a request, the mode of each where they are stated, and how they are read."""
     reading = {name: value for name, value in dict(request.get("reading") or {}).items() if value not in (None, {}, "")}
     if "columns" in reading:
-        reading["columns"] = {role: column(str(name)) for role, name in reading["columns"].items()}
+        said = {role: columns_in(names) for role, names in reading["columns"].items()}
+        reading["columns"] = {role: one_or_list([column(str(name)) for name in names]) for role, names in said.items()}
     if "sheet" in reading:
         reading["sheet"] = column(str(reading["sheet"]))
     modes = list(request.get("modes") or [])

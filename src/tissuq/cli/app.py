@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from io import TextIOWrapper
 from typing import Annotated, Any
@@ -80,6 +81,10 @@ app.add_typer(study.study, rich_help_panel="How far to trust it")
 app.command("simulate", cls=Command, hidden=True, deprecated=True)(finite_elements.structure)
 
 
+UNREAD = 141
+"""The exit status where what reads the output has ended, such as ``head``: that of the shell for other programs."""
+
+
 def main() -> None:
     """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
     end_on_request()
@@ -95,6 +100,18 @@ def main() -> None:
         typer.echo(f"tissuq: {error}. Check the path, its permissions and the space on the disk.", err=True)
         sys.exit(2)
     except SystemExit as end:
+        if _nobody_reads(end):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still to be written
+            sys.exit(UNREAD)
         if end.code in (INTERRUPTED, TERMINATED) and not isinstance(end, Stopped):
             typer.echo("tissuq: stopped; no run was written.", err=True)
         raise
+
+
+def _nobody_reads(end: SystemExit) -> bool:
+    """Return whether what reads the output ended before it was all written."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        return True
+    return isinstance(end.__context__, BrokenPipeError)

@@ -8,13 +8,14 @@ from dataclasses import replace
 from inspect import Parameter, Signature
 from io import StringIO
 from types import MappingProxyType
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 import typer
 from typer.core import TyperCommand
 
 from tissuq.cli.call import Call, Running, Verbosity
 from tissuq.cli.progress import Monitor, stopping
+from tissuq.errors import InputError
 from tissuq.studies.option import Settings, Slot, slots_of, stated
 from tissuq.studies.settings import imported, load_settings
 
@@ -132,13 +133,29 @@ def settings_of(name: str) -> type[Settings] | None:
 
 def _parameter(slot: Slot) -> Parameter:
     """Return what Typer reads of a parameter."""
+    number = next((kind for kind in (int, float) if kind in (slot.reads, *get_args(slot.reads))), None)
+    parser = _number_of(slot.typed, number) if number else None
     if slot.option.is_argument:
         kind: Any = typer.Argument(help=slot.help)
     else:
         negative = slot.option.negative or ("no-" + slot.name if slot.info.default is True else "")
         names = "/".join(f"--{name.replace('_', '-')}" for name in (slot.name, negative) if name)
         letters = [f"-{slot.option.letter}"] if slot.option.letter else []
-        kind = typer.Option(names, *letters, help=slot.help, rich_help_panel=slot.option.group or None)
+        kind = typer.Option(names, *letters, help=slot.help, rich_help_panel=slot.option.group or None, parser=parser)
     reads = slot.reads if slot.is_required else slot.reads | None
     default = Parameter.empty if slot.is_required else None
     return Parameter(slot.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[reads, kind])
+
+
+def _number_of(typed: str, kind: type) -> Callable[[Any], Any]:
+    """Return what makes a number of a text, or says what the option needs; help shows it as the kind of number."""
+
+    def parse(text: Any) -> Any:
+        try:
+            return kind(text)
+        except ValueError:
+            needed = "a whole number" if kind is int else "a number, with a decimal point"
+            raise InputError(f"{typed} needs {needed}, not '{text}'.") from None
+
+    parse.__name__ = kind.__name__
+    return parse

@@ -99,7 +99,7 @@ def ask_about(file: Path, reading: Mapping[str, Any], files: Sequence[Path]) -> 
             answers = answers_in(str(refusal), columns, settings)
             if not answers:
                 raise
-            settings = _chosen(file, str(refusal), answers, settings, files) or settings
+            settings = _chosen(file, str(refusal), answers, settings, files, columns) or settings
             continue
         question = next((text for text in _open_questions(tests) if text not in settled), None)
         if question is None:
@@ -108,7 +108,7 @@ def ask_about(file: Path, reading: Mapping[str, Any], files: Sequence[Path]) -> 
         answers = answers_in(question, columns, settings)
         if not answers:
             continue
-        settings = _chosen(file, question, answers, settings, files, now=tests) or settings
+        settings = _chosen(file, question, answers, settings, files, columns, now=tests) or settings
 
 
 def _open_questions(tests: Tests) -> list[str]:
@@ -128,11 +128,15 @@ def _chosen(
     answers: list[Answer],
     settings: Mapping[str, Any],
     files: Sequence[Path],
+    columns: Sequence[str],
     now: Tests | None = None,
 ) -> dict[str, Any] | None:
     """Return the settings with the answer that a person types; None to leave things as they are ``now``."""
     print(f"\n{wrapped(question, WIDTH)}")
-    outcomes = {answer: _what_it_gives(file, answer, settings, question, files) for answer in answers}
+    outcomes = {
+        answer: _what_it_gives(file, answer, with_options(settings, answer, columns), question, files)
+        for answer in answers
+    }
     if now is not None:
         is_read = {answer: text for answer, text in outcomes.items() if not text.startswith(REFUSED)}
         outcomes = is_read or outcomes
@@ -151,9 +155,9 @@ def _chosen(
             return None
         try:
             if typed.isdecimal() and 1 <= int(typed) <= len(listed):
-                return with_options(settings, _with_sizes(listed[int(typed) - 1]))
+                return with_options(settings, _with_sizes(listed[int(typed) - 1]), columns)
             if typed.startswith("--"):
-                return with_options(settings, Answer(options_in(typed)))
+                return with_options(settings, Answer(options_in(typed)), columns)
             print(f"Type a number from 1 to {len(listed)}, or options such as --length '20 mm'.")
         except TissuqError as error:
             print(error)
@@ -167,7 +171,7 @@ def _what_it_gives(
         is_size = set(answer.asked_for) <= set(DIMENSIONS)
         return "a size, to type with its unit" if is_size else "a number to type"
     try:
-        return tests_in_words(find_tests(file, with_options(settings, answer), files))
+        return tests_in_words(find_tests(file, settings, files))
     except TissuqError as refusal:
         if str(refusal) == question:
             return ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
 from typing import Any, NamedTuple
@@ -100,8 +100,8 @@ def answer_of_population(
         return PopulationEstimate(name, times * middle, times * low, times * high, unit_name)
 
     estimates = (
-        estimate(f"{words} of a new specimen{patient_in_words(population)}", "new patient", unit.name),
-        estimate(f"{words}, median of the population", "median", unit.name),
+        estimate(f"{words} of a new specimen{patient_in_words(population)}", "new specimen", unit.name),
+        estimate(f"{words}, median of the population{patient_in_words(population, {})}", "median", unit.name),
         estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
     )
     share = share_of_discrepancy(population, warnings, at_rest)
@@ -111,9 +111,12 @@ def answer_of_population(
     return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip(), share)
 
 
-def patient_in_words(population: PopulationDraws) -> str:
-    """Return what is known of the new specimen, in brackets; nothing without covariates."""
-    text = population.covariates.described(population.patient_covariates)
+def patient_in_words(population: PopulationDraws, known: Mapping[str, Any] | None = None) -> str:
+    """Return what is ``known`` of a specimen, in brackets, or else of the new specimen; nothing without covariates.
+
+    Of nothing it is where the median of the population is.
+    """
+    text = population.covariates.described(population.patient_covariates if known is None else known)
     return f" ({text})" if text else ""
 
 

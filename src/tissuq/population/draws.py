@@ -136,7 +136,7 @@ class PopulationDraws:
         -------
         pandas.DataFrame
             Indexed by parameter and quantity: ``median`` (of the population), ``spread`` (between specimens: sd of the
-            logarithm, or of a parameter of either sign itself), ``new patient``, and ``complete pooling``, whose
+            logarithm, or of a parameter of either sign itself), ``new specimen``, and ``complete pooling``, whose
             interval is one for specimens that were all the same: it is no range of patients. Columns median, hdi_low
             and hdi_high; the unit of stresses stands at their head.
         """
@@ -146,7 +146,7 @@ class PopulationDraws:
         rows = {}
         for index, (symbol, is_log) in enumerate(zip(self.symbols, self.coordinates.is_log, strict=True)):
             factor = self.unit_of(symbol, self.unit(unit)).to_mpa
-            for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
+            for name, draws in (("median", self.median), ("spread", self.spread), ("new specimen", self.new)):
                 is_ratio = name == "spread" and is_log
                 rows[symbol, name] = np.array(interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
             marginal = self.complete.marginals[symbol]

@@ -43,7 +43,7 @@ def draw_specimens(
     for number, (panel, (symbol, unit)) in enumerate(zip(drawn.axes, units.items(), strict=True)):
         estimates = {key: np.array([specimens[name, symbol][key] for name in order]) for key in COLUMNS}
         new, median, complete = (
-            [quantities[symbol, name][end] for end in ENDS] for name in ("new patient", "median", "complete pooling")
+            [quantities[symbol, name][end] for end in ENDS] for name in ("new specimen", "median", "complete pooling")
         )
         panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new specimen, 95 %")
         panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population, 95 %")

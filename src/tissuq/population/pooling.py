@@ -115,7 +115,7 @@ def fit_population(
     ...     for place, (name, modulus) in enumerate(moduli.items())
     ... }
     >>> found = tq.fit_population(specimens, discrepancy="none", noise_sd=0.01)
-    >>> low, high = found.summary().loc[("C10", "new patient"), ["hdi_low", "hdi_high"]]
+    >>> low, high = found.summary().loc[("C10", "new specimen"), ["hdi_low", "hdi_high"]]
     >>> bool(low < 0.4 and high > 0.7)
     True
     """

@@ -180,8 +180,8 @@ class Population(PopulationDraws):
         Returns
         -------
         pandas.DataFrame
-            Indexed by parameter and quantity (``median``, ``new patient``). Half the width over the median ``now``, and
-            its ``floor`` with any number of specimens (it is lower with probability ``assurance``); how many
+            Indexed by parameter and quantity (``median``, ``new specimen``). Half the width over the median ``now``,
+            and its ``floor`` with any number of specimens (it is lower with probability ``assurance``); how many
             ``specimens`` it takes in all, and how many ``more``: nan where the floor is above the aim, or more than a
             thousand are needed.
         """

@@ -76,9 +76,9 @@ def needed_table(population: PopulationDraws, aim: float, prob: float, assurance
         half_widths = np.hypot(_half_widths(population, j, specimens, sizes, prob), shared)
         widths = relative_width(population, j, half_widths)
         tau = population.hierarchy.tau[..., j].ravel()
-        for quantity, of_quantity in zip(("median", "new patient"), widths, strict=True):
+        for quantity, of_quantity in zip(("median", "new specimen"), widths, strict=True):
             likely = np.quantile(of_quantity, assurance, axis=0)
-            scatter = score(prob) * tau * (quantity == "new patient")
+            scatter = score(prob) * tau * (quantity == "new specimen")
             floor = float(np.quantile(relative_width(population, j, np.hypot(scatter, shared)), assurance))
             needed = _first_below(aim, sizes, likely) if floor < aim else np.nan
             rows[symbol, quantity] = [likely[0], floor, needed, needed - count]

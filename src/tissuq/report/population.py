@@ -82,7 +82,7 @@ POINTS = 81
 QUANTITIES = {
     "median": "median of the population",
     "spread": "spread between specimens",
-    "new patient": "a new specimen",
+    "new specimen": "a new specimen",
     "complete pooling": "complete pooling",
 }
 

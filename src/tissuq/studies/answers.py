@@ -13,6 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.numbers import number_in
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import slots_of, stated
+from tissuq.studies.option_texts import columns_in, one_or_list
 from tissuq.studies.settings import imported
 
 READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
@@ -140,8 +141,11 @@ def options_in(text: str) -> tuple[tuple[str, str], ...]:
     return tuple(options)
 
 
-def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
-    """Return settings of reading with those of an answer, added to columns, sizes and rows that are given already."""
+def with_options(settings: Mapping[str, Any], answer: Answer, columns: Sequence[str] = ()) -> dict[str, Any]:
+    """Return settings of reading with those of an answer, added to columns, sizes and rows that are given already.
+
+    An answer for a file with some ``columns`` replaces what was said of a role there, and not what of other files.
+    """
     if answer.leaves_out:
         sizes = {name: size for name, size in (settings.get("dimensions") or {}).items() if name != answer.leaves_out}
         remaining = {name: value for name, value in settings.items() if name != answer.leaves_out}
@@ -162,5 +166,14 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
     merged = dict(settings)
     for setting, value in stated(READING.values(), values)[0].items():
         earlier = merged.get(setting)
+        if setting == "columns" and columns:
+            added = {role: one_or_list([*_elsewhere(earlier, role, columns), name]) for role, name in value.items()}
+            merged[setting] = {**(earlier or {}), **added}
+            continue
         merged[setting] = {**earlier, **value} if isinstance(value, dict) and isinstance(earlier, dict) else value
     return merged
+
+
+def _elsewhere(said: Mapping[str, Any] | None, role: str, columns: Sequence[str]) -> list[str | int]:
+    """Return the columns that are said of a role, but for those in a file with some columns."""
+    return [name for name in columns_in((said or {}).get(role)) if isinstance(name, str) and name not in columns]

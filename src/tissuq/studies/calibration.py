@@ -24,7 +24,7 @@ from tissuq.experiments.reading.headings import heading, is_of_specimens, plain
 from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, only_rows, row_names
 from tissuq.experiments.reading.table import Table, rows_in
 from tissuq.experiments.reading.tables import read_table
-from tissuq.experiments.units import PRESSURE, measured_in, stress_unit
+from tissuq.experiments.units import FORCE, LENGTH, PRESSURE, measured_in, stress_unit
 from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.parameter import Parameter
@@ -140,7 +140,7 @@ def run_calibration(
         _check_other_measurements(settings, data, folder / prior_run)
     units = {name: measured.units for name, measured in data.items()}
     if settings.material is not None and not settings.models:
-        _check_unit(settings, [measured for _, measured in units.values()])
+        _check_unit(settings, list(units.values()))
     forward = settings.forward_model(folder, units, experiments, **running)
     start = perf_counter()
     names = ("discrepancy", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
@@ -244,17 +244,25 @@ def _are_proportional(values: FloatArray, others: FloatArray) -> bool:
     return agree(others, values * (values @ others / (values @ values)), FOUR_DIGITS)
 
 
-def _check_unit(settings: CalibrationSettings, measured: Sequence[str]) -> None:
-    """Refuse measured stresses or pressures in another unit than the law, unless the user says that of the model."""
+def _check_unit(settings: CalibrationSettings, units: Sequence[tuple[str, str]]) -> None:
+    """Refuse measurements whose units go with another one than the law's, unless the user says that of the model.
+
+    They are stresses or pressures in it, or forces with lengths as controls: of mN and mm the unit of stress is kPa.
+    """
     if "unit" in settings.model_fields_set:
         return
-    for unit in measured:
-        factor = PRESSURE.factor_or_none(unit) if measured_in(unit) in ("stress", PRESSURE.name) else None
+    for control, measured in units:
+        factor = PRESSURE.factor_or_none(measured) if measured_in(measured) in ("stress", PRESSURE.name) else None
+        said, named = f"the measured values are in {measured}", measured
+        force, length = FORCE.factor_or_none(measured), LENGTH.factor_or_none(control)
+        if force and length:
+            factor = force / length**2
+            named = next((name for name in ("kPa", "Pa") if isclose(stress_unit(name).to_mpa, factor)), "kPa")
+            said = f"the forces are in {measured} and the controls in {control}"
         if factor is not None and not isclose(factor, stress_unit(settings.unit).to_mpa, rel_tol=SAME_UNIT):
             raise InputError(
-                f"the measured values are in {unit}, and the parameters of {settings.material} would be taken in "
-                f"{settings.unit}: say in which unit of stress the model computes, --unit {unit} or --unit "
-                f"{settings.unit}."
+                f"{said}, and the parameters of {settings.material} would be taken in {settings.unit}: say in which "
+                f"unit of stress the model computes, --unit {named} or --unit {settings.unit}."
             )
 
 

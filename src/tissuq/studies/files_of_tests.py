@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import ReadingSettings
+from tissuq.studies.option_texts import columns_in
 from tissuq.studies.settings import load_settings, seen_from
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def measured(
     if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
-                raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
+                raise InputError(_too_many(option, stated, "one test", "give it once"))
         return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(readings)
     if len(tests) > len(files):
         say("\n".join([*lines_of_tests(list(map(Inspection.of, readings))), ""]))
@@ -126,7 +127,13 @@ def measured(
 
 
 def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options that read one of several files: without columns that others have, and it has not."""
+    """Return the options that read one of several files: without columns that others have, and it has not.
+
+    Raises
+    ------
+    InputError
+        When it has several columns that are given for one role.
+    """
     from tissuq.experiments.reading.recognition import find_column
 
     def has(path: Path, role: str, name: str | int) -> bool:
@@ -138,10 +145,18 @@ def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) ->
 
     tables = cache(lambda path: tables_of(path, reading))
     columns = dict(reading.get("columns") or {})
-    if len(files) > 1:
-        for role, name in list(columns.items()):
-            if not has(file, role, name) and any(has(other, role, name) for other in files):
-                del columns[role]
+    for role, value in list(columns.items()):
+        names = columns_in(value)
+        if len(names) == len(files) == 1:
+            continue
+        here = [name for name in names if has(file, role, name)]
+        if len(here) > 1:
+            listed = " and ".join(f"'{name}'" for name in here)
+            raise InputError(f"{file}: --column is given twice for '{role}', and there are {listed}; give it once.")
+        if here:
+            columns[role] = here[0]
+        elif any(has(other, role, name) for other in files for name in names):
+            del columns[role]
     return {**reading, "columns": columns or None}
 
 
@@ -226,7 +241,15 @@ def _for_each(counts: Sequence[int], option: str, values: Sequence[Any] | None) 
     if len(values) == sum(counts):
         return list(values)
     tests = f" with {sum(counts)} tests" if sum(counts) != len(counts) else ""
-    raise InputError(f"{option} is given {len(values)} times for {len(counts)} files{tests}; give it once for each.")
+    raise InputError(_too_many(option, values, f"{len(counts)} files{tests}", "give it once for each"))
+
+
+def _too_many(option: str, values: Sequence[Any], tests: str, advice: str) -> str:
+    """Return why an option cannot be of some tests; numbers between commas may be one with a decimal comma."""
+    if option != "--noise-sd":
+        return f"{option} is given {len(values)} times for {tests}; {advice}."
+    numbers = " and ".join(f"{value:g}" for value in values)
+    return f"--noise-sd has {len(values)} numbers, {numbers}, for {tests}; {advice}, with a decimal point and no comma."
 
 
 def study_file(tests: Sequence[Mapping[str, Any]], inspections: Sequence[Inspection], folder: Path) -> str:

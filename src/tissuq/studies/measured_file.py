@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, cast
 from pydantic import Field, field_validator, model_validator
 
 from tissuq.studies.option import Settings, only_rows, option, seed
-from tissuq.studies.option_texts import column, pairs_of, range_of, sd_or_unknown, tolerances
+from tissuq.studies.option_texts import column, columns_by_role, range_of, sd_or_unknown, tolerances
 from tissuq.studies.settings import SizesOfErrors, positive_or_unknown, there_is
 
 if TYPE_CHECKING:
@@ -39,9 +39,10 @@ class ReadingSettings(Settings):
         help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, or "
         "pressure, outer_diameter (or inner_diameter), axial_stretch and force (or total_force) of a tube, such as "
         "stretch=Strain, or stress=2:5 for columns of as many tests; of the "
-        "spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
+        "spread of a mean: sd or sem, and n; repeat, of several files also a role. Of a second axis or stress: "
+        "stretch2 ... sem2.",
         name="column",
-        parse=pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column),
+        parse=columns_by_role,
     )
     stress_unit: str | None = reading(
         None, "Unit of the stress column [the file's, or MPa]; for forces, the unit shown [kPa]."
@@ -109,6 +110,14 @@ class ReadingSettings(Settings):
     sheet: str | int | None = reading(None, "Sheet of a workbook, by name or number.", parse=column)
     table: int | None = reading(None, "Which of several tables of a text or sheet, from 1.", ge=1)
     skip_rows: int = reading(0, "Lines to skip at the top of the file.", ge=0)
+
+    @field_validator("columns", mode="before")
+    @classmethod
+    def _one_column_of_a_role(cls, columns: Any) -> Any:
+        for role, names in columns.items() if isinstance(columns, dict) else ():
+            if isinstance(names, list):
+                raise ValueError(f"'{role}' is given {len(names)} times; give it once")
+        return columns
 
     @property
     def reading_options(self) -> ReadingOptions:

@@ -49,6 +49,27 @@ def column(text: str) -> str | int:
     return int(text) if text.isdecimal() else text
 
 
+def columns_by_role(texts: Sequence[str]) -> dict[str, Any]:
+    """Return the column of every role; of a role that is given again, for another file, the list of its columns."""
+    columns: dict[str, Any] = {}
+    parse = pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column)
+    for text in texts:
+        for role, name in parse([text]).items():
+            columns[role] = one_or_list([*columns_in(columns.get(role)), name])
+    return columns
+
+
+def columns_in(value: Any) -> list[str | int]:
+    """Return the columns of a role as a list: none, one or several."""
+    return list(value) if isinstance(value, list | tuple) else [] if value is None else [value]
+
+
+def one_or_list(names: Iterable[str | int]) -> Any:
+    """Return different columns of a role: the only one, or their list."""
+    different = list(dict.fromkeys(names))
+    return different[0] if len(different) == 1 else different
+
+
 def number_or_text(text: str) -> float | str:
     """Return a number, or what is none as it is."""
     try:

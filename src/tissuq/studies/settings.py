@@ -140,7 +140,7 @@ def _explanations(error: ValidationError, kind: type[BaseModel], typed: Mapping[
 
 def _explain(item: Any, typed: Mapping[str, str]) -> str:
     location, message = _place(item), str(item["msg"]).removeprefix("Value error, ").rstrip(".")
-    message = message.partition(", unable to parse")[0]
+    message = message.partition(", unable to parse")[0].replace("Input should be", "must be")
     if item["type"] == "missing":
         return f"setting '{location}' is missing"
     is_told = item["type"] == "value_error" or isinstance(item["input"], dict)

@@ -3,8 +3,8 @@ import { alertOf, button, byId, fill, make, onPage, options, request } from "./d
 import { showFound } from "./reading.js";
 import { reportOf, showAnswer, showCards, showLaws, showPrediction } from "./results.js";
 
-const state = { session: "", files: [], renamed: {}, reading: {}, modes: {}, found: null, settled: new Set(), answer: null, fitted: null };
-const listeners = new Map(), early = new Map(), MAX_NAME = 200;
+const state = { session: "", files: [], renamed: {}, reading: {}, modes: {}, found: null, settled: new Set(), answer: null, fitted: null, begun: {} };
+const listeners = new Map(), early = new Map(), MAX_NAME = 200, KEPT = "tissuq";
 const own = path => `sessions/${state.session}/${path}`;
 const result = path => own(`results/${path.split("/").map(encodeURIComponent).join("/")}`), zip = path => own(`zip/${path.split("/").map(encodeURIComponent).join("/")}`);
 const safely = work => async (...values) => { try { await work(...values); } catch (error) { alertOf(error.message); } };
@@ -15,43 +15,46 @@ const hear = event => {
   else early.set(news.task, [...(early.get(news.task) ?? []), news]);
 };
 
-// Begins a task; heard(kind, data) gets its news. Gives its number.
-const begin = async (task, values, heard) => {
-  const { task: number } = await request(own(`tasks/${task}`), { method: "POST", body: JSON.stringify(values) });
+// Begins a task, unless it has a number already; heard(kind, data) gets its news, of which the first is its number.
+const begin = async (task, values, heard, earlier = null) => {
+  const number = earlier ?? (await request(own(`tasks/${task}`), { method: "POST", body: JSON.stringify(values) })).task;
   listeners.set(number, news => {
     if (["done", "error", "stopped"].includes(news.kind)) listeners.delete(number);
     heard(news.kind, news.data);
   });
+  heard("begun", number);
   for (const news of early.get(number) ?? []) listeners.get(number)?.(news);
   early.delete(number);
-  return number;
 };
 const stop = number => request(own(`tasks/${number}`), { method: "DELETE" }).catch(() => {});
 
-// Begins a task whose stages are shown, with a button that stops it.
-const beginShown = async (task, values, place, form, heard) => {
+// Begins a task whose stages are shown, with a button that stops it; or shows one that was begun before the page was loaded again.
+const beginShown = async (task, values, earlier = null) => {
   alertOf("");
+  const place = byId(`${task}-progress`), submit = byId(`${task}-form`).querySelector("[type=submit]"), before = state.begun[task];
   const stages = make("ol", { className: "stages", aria: { live: "polite" } }), bar = make("progress", { aria: { label: "working" } });
-  const submit = form.querySelector("[type=submit]");
   submit.disabled = true;
   let number = null, asked = false;
   const cancel = button("Cancel", () => { asked = true; cancel.disabled = true; if (number != null) stop(number); });
   const add = words => { stages.querySelector(".now")?.classList.remove("now"); stages.append(make("li", { className: "now", textContent: words })); };
   const end = (...shown) => { submit.disabled = false; fill(place, ...shown); };
+  const fail = (...shown) => { state.begun[task] = before; end(make("p", ...shown)); };
   fill(place, stages, bar, make("p", {}, cancel));
   add("waiting for a free process (at the start it takes some seconds to get ready)");
   const news = (kind, data) => {
-    if (kind === "start") stages.replaceChildren();
+    if (kind === "begun") {
+      number = data;
+      state.begun[task] = { number, values };
+      if (asked) stop(number);
+    } else if (kind === "start") stages.replaceChildren();
     else if (kind === "step") add(data);
-    else if (kind === "error") end(make("p", { className: "warning problem", role: "alert", textContent: onPage(data.text) }));
-    else if (kind === "stopped") end(make("p", { className: "soft", role: "status", textContent: "Stopped. Nothing was kept of it." }));
-    else { if (kind === "done") end(); heard(kind, data); }
+    else if (kind === "error") fail({ className: "warning problem", role: "alert", textContent: onPage(data.text) });
+    else if (kind === "stopped") fail({ className: "soft", role: "status", textContent: "Stopped. Nothing was kept of it." });
+    else { if (kind === "done") end(); HEARD[task](kind, data, values); }
   };
   try {
-    number = await begin(task, values, news);
-    if (asked) stop(number);
-  } catch (error) { end(make("p", { className: "warning problem", role: "alert", textContent: error.message })); }
-  return number;
+    await begin(task, values, news, earlier);
+  } catch (error) { fail({ className: "warning problem", role: "alert", textContent: error.message }); }
 };
 
 const measured = () => {
@@ -65,7 +68,7 @@ const fitted = () => { // with a mode for every test: one file may hold tests in
   return { ...request, modes: are_said ? tests.map(test => state.modes[test.file] || test.mode) : [] };
 };
 
-const changedSince = () => { byId("stale").hidden = !state.answer || state.fitted === JSON.stringify([fitted(), fitOptions()]); };
+const changedSince = () => { byId("stale").hidden = !state.answer || state.fitted === JSON.stringify({ ...fitted(), ...fitOptions() }); };
 
 let inspection = 0;
 const inspect = safely(async () => {
@@ -81,7 +84,7 @@ const inspect = safely(async () => {
   }
   byId("understood").setAttribute("aria-busy", "true");
   await begin("inspect", measured(), (kind, data) => {
-    if (turn !== inspection || kind === "start") return;
+    if (turn !== inspection || !["done", "error"].includes(kind)) return;
     byId("understood").removeAttribute("aria-busy");
     if (kind === "error") { alertOf(data.text); return; }
     state.found = data;
@@ -89,6 +92,7 @@ const inspect = safely(async () => {
     byId("fitting").hidden = Boolean(data.error) || !data.tests.length;
     for (const place of document.querySelectorAll(".unit")) place.textContent = data.tests[0]?.unit ?? "";
     showFiles();
+    changedSince();
   });
 });
 
@@ -134,14 +138,12 @@ const fitOptions = () => ({
   noise_sd: byId("noise").value.trim() ? Number(byId("noise").value) : null, stable_in: byId("stable").checked ? ["all"] : [],
   is_one_specimen: byId("one-specimen").checked });
 
-const fit = safely(async event => {
-  event.preventDefault();
-  if (byId("noise").value.trim() && !(Number(byId("noise").value) > 0)) throw new Error("The noise is a positive number with a decimal point, or nothing.");
-  const asked = [fitted(), fitOptions()];
-  await beginShown("fit", { ...asked[0], ...asked[1] }, byId("fit-progress"), byId("fit-form"), (kind, data) => {
+// What comes of tasks whose stages are shown.
+const HEARD = {
+  fit: (kind, data, values) => {
     if (kind === "answer") {
       state.answer = data;
-      state.fitted = JSON.stringify(asked);
+      state.fitted = JSON.stringify(values);
       showAnswer(data);
       byId("answer").hidden = false;
       byId("further").hidden = true;
@@ -151,34 +153,39 @@ const fit = safely(async event => {
       byId("answer-title").scrollIntoView({ block: "start" });
     } else if (kind === "done") {
       fill(byId("report"), make("h3", { textContent: "The report" }), reportOf(result(data.report), "Report of the fit"));
-      for (const id of ["laws", "predict", "export"]) { fill(byId(`${id}-result`)); fill(byId(`${id}-progress`)); }
+      for (const id of ["laws", "predict", "export"]) { fill(byId(`${id}-result`)); fill(byId(`${id}-progress`)); if (state.begun[id]?.number < state.begun.fit.number) delete state.begun[id]; }
       byId("zip").href = zip(`runs/${data.run}`);
       byId("mode").value = state.choices.modes.find(mode => !state.answer.modes.includes(mode.name) && mode.controls.length === 1)?.name ?? "";
       byId("further").hidden = false;
     }
-  });
-});
+  },
+  laws: (kind, data) => { if (kind === "done") showLaws(data, result(data.report), zip(`runs/${data.run}`)); },
+  predict: (kind, data) => { if (kind === "done") showPrediction(data, result(data.report), zip(`runs/${data.run}`)); },
+  export: (kind, data) => { if (kind === "done") showCards(data, zip(data.folder)); },
+};
 
+const fit = safely(async event => {
+  event.preventDefault();
+  if (byId("noise").value.trim() && !(Number(byId("noise").value) > 0)) throw new Error("The noise is a positive number with a decimal point, or nothing.");
+  await beginShown("fit", { ...fitted(), ...fitOptions() });
+});
 const compare = safely(async event => {
   event.preventDefault();
   const chosen = [...byId("law-list").querySelectorAll("input:checked")].map(box => box.value), isAll = byId("all-laws").checked;
   if (!isAll && chosen.length < 2) throw new Error("Choose two laws or more, or all of them.");
-  const { material, ...others } = fitOptions();
-  await beginShown("laws", { ...JSON.parse(state.fitted)[0], ...others, laws: isAll ? ["all"] : chosen }, byId("laws-progress"), byId("laws-form"),
-    (kind, data) => { if (kind === "done") showLaws(data, result(data.report), zip(`runs/${data.run}`)); });
+  const { material, ...asked } = { ...JSON.parse(state.fitted), ...fitOptions() };
+  await beginShown("laws", { ...asked, laws: isAll ? ["all"] : chosen });
 });
 const predict = safely(async event => {
   event.preventDefault();
   const values = Object.fromEntries(new FormData(byId("predict-form")));
   if (byId("stretch2-line").hidden) delete values.stretch2;
-  await beginShown("predict", { ...values, run: state.answer.run }, byId("predict-progress"), byId("predict-form"),
-    (kind, data) => { if (kind === "done") showPrediction(data, result(data.report), zip(`runs/${data.run}`)); });
+  await beginShown("predict", { ...values, run: state.answer.run });
 });
 const exportCards = safely(async event => {
   event.preventDefault();
   const values = Object.fromEntries(new FormData(byId("export-form")));
-  await beginShown("export", { ...values, draws: Number(values.draws), all_draws: byId("all-draws").checked, run: state.answer.run }, byId("export-progress"), byId("export-form"),
-    (kind, data) => { if (kind === "done") showCards(data, zip(data.folder)); });
+  await beginShown("export", { ...values, draws: Number(values.draws), all_draws: byId("all-draws").checked, run: state.answer.run });
 });
 
 const showChoices = choices => {
@@ -198,6 +205,23 @@ const showChoices = choices => {
   byId("all-laws").addEventListener("change", () => { for (const box of byId("law-list").querySelectorAll("input")) box.disabled = byId("all-laws").checked; });
 };
 
+// The tab keeps what was chosen and begun, for when its page is loaded again; the files stay with tissuq for a while.
+const choicesOf = () => [...byId("fit-form").elements].filter(input => input.id && input.type !== "submit");
+const keep = () => {
+  const { session, files, renamed, reading, modes, settled, begun } = state, choices = choicesOf().map(input => [input.id, input.type === "checkbox" ? input.checked : input.value]);
+  sessionStorage.setItem(KEPT, JSON.stringify({ session, files, renamed, reading, modes, settled: [...settled], begun, choices }));
+};
+const takeUp = async ({ renamed, reading, modes, settled, begun, choices }) => {
+  Object.assign(state, { renamed, reading, modes, settled: new Set(settled) });
+  for (const [id, value] of choices) byId(id)[typeof value === "boolean" ? "checked" : "value"] = value;
+  byId("material").dispatchEvent(new Event("change"));
+  for (const [task, { number, values }] of Object.entries(begun)) {
+    byId(`${task}-progress`).closest("details")?.setAttribute("open", "");
+    await beginShown(task, values, number);
+  }
+  await inspect();
+};
+
 const start = safely(async () => {
   let prepared;
   state.prepared = new Promise(resolve => { prepared = resolve; });  // files chosen before wait for it
@@ -207,14 +231,17 @@ const start = safely(async () => {
   addEventListener("dragleave", event => { if (!event.relatedTarget) drop.classList.remove("over"); });
   addEventListener("drop", event => { event.preventDefault(); drop.classList.remove("over"); upload([...event.dataTransfer.files]); });
   if (pick.files.length) choose();  // chosen before this was loaded
-  Object.assign(state, await request("sessions", { method: "POST" }));
+  const kept = JSON.parse(sessionStorage.getItem(KEPT)), again = await request(`sessions?again=${kept?.session ?? ""}`, { method: "POST" });
+  Object.assign(state, again);
   const news = new EventSource(own("news"));
   news.addEventListener("message", hear);
   news.addEventListener("error", () => { if (news.readyState === EventSource.CLOSED) alertOf("tissuq has ended, or this page was away for too long. Start 'tissuq app' again, or load the page again."); });
-  addEventListener("pagehide", () => navigator.sendBeacon(own("end")));
+  addEventListener("pagehide", keep);
   showChoices(await new Promise((resolve, reject) => {
     begin("choices", {}, (kind, data) => { if (kind === "done") resolve(data); else if (kind === "error") reject(new Error(data.text)); }).catch(reject);
   }));
+  if (kept?.session === again.session) await takeUp(kept);
+  else if (kept?.files.length) alertOf("This page was away for too long, and its files are deleted. Choose them again.");
   prepared();
   byId("fit-form").addEventListener("submit", fit);
   byId("fit-form").addEventListener("change", changedSince);

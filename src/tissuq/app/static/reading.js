@@ -74,15 +74,16 @@ const fieldOf = ([name, words, kind], reading, change) => {
 
 const columnsOf = (found, reading, change) => {
   const file = found.error?.file ?? found.tests[0]?.file, columns = found.tables[file]?.[0]?.columns ?? [];
-  const isHere = ([, name]) => columns.some(column => column.name === String(name)), said = Object.entries(reading.columns ?? {});
+  const isHere = ([, name]) => columns.some(column => column.name === String(name)), said = Object.entries(reading.columns ?? {}).flatMap(([role, names]) => [names].flat().map(name => [role, name])); // of several files a role may have several
   const seen = found.tests.find(test => test.file === file)?.roles ?? Object.fromEntries(said.filter(isHere).map(([role, name]) => [String(name), role]));
   const roles = { ...seen };
   const choose = (name, role) => {
     const kinds = [role, ...RIVALS.filter(group => group.includes(role)).flat()];
     for (const other of Object.keys(roles)) if (other !== name && kinds.includes(roles[other])) delete roles[other];
     if (role) roles[name] = role; else delete roles[name];
-    const chosen = Object.fromEntries(Object.entries(roles).map(([column, of]) => [of, column]));
-    change(now => ({ ...now, columns: { ...Object.fromEntries(said.filter(item => !isHere(item))), ...chosen } }));
+    const columns = {};
+    for (const [of, column] of [...said.filter(item => !isHere(item)), ...Object.entries(roles).map(item => item.toReversed())]) columns[of] = [...columns[of] ?? [], column];
+    change(now => ({ ...now, columns }));
   };
   return make("fieldset", {}, make("legend", { textContent: "Columns" }), make("div", { className: "columns" }, ...columns.map(column => {
     const select = options(make("select", { name: `column ${column.name}` }), [...new Set([...ROLES, ...Object.values(roles)])].map(role => ({ value: role, textContent: role.replace("_", " ") })), "not read");

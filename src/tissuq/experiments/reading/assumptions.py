@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +20,10 @@ from tissuq.experiments.reading.table import Table
 
 DOUBTFUL_UNIT, DOUBTFUL_COLUMN = "check the unit:", "check the column:"
 """How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000, a wrong column anything."""
+
+
+DISC = re.compile(r"(?i)parallel[ -]plate|plate[ -/]plate|platte[ -/]platte|(?<!\w)pp ?\d{1,2}(?![\d.])")
+"""Words above a table of a rheometer with a disc between plates, such as ``PP25``."""
 
 
 def is_doubtful(warning: str) -> bool:
@@ -54,12 +59,14 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], options
         corrections = (_about_correction(measured.table, column, role) for column, role in roles.items())
         sentences += filter(None, (*names, *corrections))
     if choices[0].measure == "shear" and choices[0].load == "stress" and options.get("stress_type") is None:
+        torques = [f"column '{name}' stands" for name in measured.table.names if is_torque(name)]
+        discs = [
+            f"line {line} says '{' '.join(text.split())}'" for line, text in measured.table.head if DISC.search(text)
+        ]
         sentences += [
-            f"column '{name}' stands beside the shear stress, which a rheometer states as if a twisted disc were of a "
-            "linear material. If a disc was twisted, give --stress-type torsion, which corrects it; if not, "
-            "--stress-type engineering."
-            for name in measured.table.names
-            if is_torque(name)
+            f"{seen} beside the shear stress, which a rheometer states as if a twisted disc were of a linear material. "
+            "If a disc was twisted, give --stress-type torsion, which corrects it; if not, --stress-type engineering."
+            for seen in torques or discs[:1]
         ]
     if ZERO_ASSUMED in source:
         table, columns = measured.table, [choice.deformation for choice in choices]

@@ -226,7 +226,8 @@ class Dimensions:
         sides = [name for name in ("width", "thickness") if name in self.sizes]
         if sides:
             missing_side = "thickness" if sides[0] == "width" else "width"
-            return f"Known is only the {sides[0]}. {self._others(LENGTH, missing_side, default='')}".rstrip()
+            others = self._others(LENGTH, missing_side, default="")
+            return f"The {sides[0]} is known, so that the {missing_side} is enough. {others}".rstrip()
         areas = self._others(AREA, "area", default="")
         return areas or self._others(LENGTH, "width", "thickness", "diameter")
 

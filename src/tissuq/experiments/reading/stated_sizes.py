@@ -128,6 +128,8 @@ def names_of_specimen(
     loads = [k for k, name in enumerate(table.names) if name == table.names[choices[0].stress]]
     if len(loads) > 1 and (names_over := names_above(table, loads)):
         names.append(names_over[loads.index(choices[0].stress)])
+    words = [plain(name).partition(" ") for name in names]
+    names += [number for specimen, _, number in words if is_of_specimens(specimen)]  # of 'Specimen A1' also 'A1'
     return frozenset(filter(None, map(plain, names)))
 
 

@@ -193,7 +193,7 @@ def find_tests_in_file(
         except InputError as error:
             refused.append((table, error, 1 / LENGTH_RATIO, "it is short, and cannot be read as a test."))
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
-    refused.sort(key=lambda item: -item[2])
+    refused.sort(key=lambda item: -item[2] if tests else -len(item[0].rows))
     for table, why, share, _ in refused:
         if len(table.rows) >= share * longest:
             raise _may_be_test(why, tests) if tests else why

@@ -110,7 +110,8 @@ ROLES = {
     "displacement": names_of(
         "displacement, disp, compression, uzama, yer değiştirme, "
         "axial displacement, compressive displacement, extension, tensile extension, "
-        "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
+        "compressive extension, crosshead, crosshead displacement, extension from preload, weg, standardweg, "
+        "traversenweg, verfahrweg, kolbenweg, position, "
         "axial position, crosshead position, crosshead travel, cross head travel, stroke, travel, traverse, "
         "déplacement, allongement, desplazamiento, "
         "alargamiento, deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
@@ -303,7 +304,7 @@ DIMENSION_NAMES = {
     ),
     "length": names_of(
         "length, gauge length, gage length, l0, grip separation, grip to grip separation, distance between grips, "
-        "messlänge, anfangsmesslänge, anfangslänge, ausgangslänge, einspannlänge, probenlänge, "
+        "länge, messlänge, anfangsmesslänge, anfangslänge, ausgangslänge, einspannlänge, probenlänge, "
         "longueur, longueur de référence, longueur entre repères, longueur entre mors, distance entre mors, "
         "longitud, longitud de referencia, "
         "longitud entre puntos, longitud entre mordazas, distancia entre mordazas, comprimento, "
