@@ -189,11 +189,9 @@ class ErrorEstimates:
         level, solve = model.fitted_errors.level or model.noise_of_tests[1], self._similar_solver()
 
         def log_evidence_at(lag: float) -> float:
-            nonlocal level
             lagged = model.with_errors(lag=lag)
             if self._sums_noise(model):
-                level, log_evidence = self._best_level(lagged, level, solve)
-                return log_evidence
+                return self._best_level(lagged, level, solve)[1]
             return _evidence_of(self._solution(lagged), lagged)
 
         best, evidences = len(LAG_GRID) // 2, dict[int, float]()

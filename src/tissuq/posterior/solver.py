@@ -109,7 +109,7 @@ class Solver:
         lattice, points = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy)), AdaptedPoints(accuracy)
         cells = AdaptiveCells(
             accuracy == FINE, accuracy.tolerance
-        )  # the first noise is the least, its ridge the thinnest
+        )  # the first noise is the least: of the thinnest ridge
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
