@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tissuq.arrays import FloatArray
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.inference.solution import Solution
@@ -20,6 +21,10 @@ NEAR_STRAIN_SHARE = 0.15
 
 MIN_CHANGE, MIN_ERRORS = 0.2, 4.0
 """Change of the ratio of two tests' stresses along them, over its middle, that is told, and its standard errors."""
+
+MAX_RATIO, MIN_IN_COMMON = 3.0, 5
+"""Ratio of the stresses of tests that were loaded alike from which it is told, 2.5 standard deviations (0.42) of the
+logarithm of that of moduli of a tissue in two tests; measurements, at the least, where both were loaded alike."""
 
 MEASUREMENTS_OF_MEAN, MIN_FALL = 3, 0.05
 """Consecutive measurements whose mean is compared, and by what share of the largest mean a stress falls to the end."""
@@ -112,6 +117,28 @@ def _ratios(one: Experiment, other: Experiment) -> tuple[float, float, float] | 
 
     It is taken to be linear in the strain, by least squares at the points of the first test.
     """
+    if (common := _common(one, other, MIN_MEASUREMENTS)) is None:
+        return None
+    share, stress, other_stress, end = common
+    columns = other_stress[:, None] * np.column_stack([np.ones(len(share)), share])
+    weights, squares, rank, _ = np.linalg.lstsq(columns, stress, rcond=None)
+    if rank < 2 or weights[0] <= 0 or weights.sum() <= 0:
+        return None
+    variance = float(squares[0]) / (len(stress) - 2) * np.linalg.inv(columns.T @ columns)[1, 1]
+    change, middle = abs(float(weights[1])), float(weights[0] + weights[1] / 2)
+    if change < MIN_CHANGE * middle or change < MIN_ERRORS * np.sqrt(variance):
+        return None
+    return float(weights[0]), float(weights.sum()), end
+
+
+def _common(one: Experiment, other: Experiment, fewest: int) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
+    """Return what two tests have in common that were loaded alike; None of fewer measurements of the first.
+
+    Returns
+    -------
+    Shares (k,) of the way to the end of the shorter one at points of the first, the stresses of both there, and the
+    value of the control at that end.
+    """
     if one.mode != other.mode or len(one.curves) + len(other.curves) > 2 or len(one.mode.controls) > 1:
         return None
     reference = one.mode.controls[0].reference
@@ -119,18 +146,46 @@ def _ratios(one: Experiment, other: Experiment) -> tuple[float, float, float] | 
     sign = 1.0 if strain.max() > -strain.min() else -1.0
     reach = min(float((sign * strain).max()), float((sign * other_strain).max()))
     order, is_common = np.argsort(other_strain, kind="stable"), (sign * strain > 0) & (sign * strain <= reach)
-    if is_common.sum() < MIN_MEASUREMENTS:
+    if is_common.sum() < fewest:
         return None
-    stress = np.interp(strain[is_common], other_strain[order], other.curves[0].stress[order])
-    columns = stress[:, None] * np.column_stack([np.ones(len(stress)), sign * strain[is_common] / reach])
-    weights, squares, rank, _ = np.linalg.lstsq(columns, one.curves[0].stress[is_common], rcond=None)
-    if rank < 2 or weights[0] <= 0 or weights.sum() <= 0:
+    other_stress = np.interp(strain[is_common], other_strain[order], other.curves[0].stress[order])
+    share = sign * strain[is_common] / reach
+    return share, one.curves[0].stress[is_common], other_stress, reference + sign * reach
+
+
+def stresses_apart(experiment: Experiment) -> str:
+    """Return in words that the stress of a test is another than those of tests that were loaded alike; or nothing.
+
+    Than their median, as among many specimens of a tissue two may well differ by more than a pair does.
+    """
+    labelled = list(zip(labels_of_tests(experiment.tests), experiment.tests, strict=True))
+    farthest, words = np.log(MAX_RATIO), ""
+    for name, one in labelled:
+        pairs = [(other_name, _ratio(one, other)) for other_name, other in labelled if other is not one]
+        ratios = {other_name: ratio for other_name, ratio in pairs if ratio is not None}
+        median = float(np.median([*ratios.values()])) if ratios else 1.0
+        if abs(np.log(median)) > farthest:
+            others = f"the median of {len(ratios)} other tests" if len(ratios) > 1 else f"that of '{min(ratios)}'"
+            farthest, words = abs(np.log(median)), f"of '{name}' is {median:.2g} times {others}"
+    return f"the tests contradict each other: the stress {words} where they were loaded alike. " * bool(words)
+
+
+def _ratio(one: Experiment, other: Experiment) -> float | None:
+    """Return the ratio of the stresses of two tests that were loaded alike; None where little is in common.
+
+    Scatter makes least squares of one on the other too small, and the other way round too large: of what is between,
+    that which is nearest to one.
+    """
+    if common := _common(one, other, MIN_IN_COMMON):
+        _, stress, other_stress, _ = common
+    elif common := _common(other, one, MIN_IN_COMMON):
+        _, other_stress, stress, _ = common
+    else:
         return None
-    variance = float(squares[0]) / (len(stress) - 2) * np.linalg.inv(columns.T @ columns)[1, 1]
-    change, middle = abs(float(weights[1])), float(weights[0] + weights[1] / 2)
-    if change < MIN_CHANGE * middle or change < MIN_ERRORS * np.sqrt(variance):
+    product = float(stress @ other_stress)
+    if product <= 0:
         return None
-    return float(weights[0]), float(weights.sum()), reference + sign * reach
+    return float(np.clip(1.0, product / float(other_stress @ other_stress), float(stress @ stress) / product))
 
 
 def factors_of_tests(solution: Solution) -> dict[str, float]:

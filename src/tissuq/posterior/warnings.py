@@ -10,7 +10,7 @@ from scipy.special import bdtr
 
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.extent import has_energy
-from tissuq.assessment.measurements import falls, labels_of_tests
+from tissuq.assessment.measurements import falls, labels_of_tests, stresses_apart
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.separability import inseparable_parameters
@@ -303,6 +303,12 @@ def _lag1_correlation(solution: Solution) -> float | None:
 def _tests_apart(solution: Solution) -> str:
     """Return in words that tests are farther from the curve of one material than their spread allows; else nothing."""
     model, tests = solution.model, solution.model.experiment.tests
+    advice = (
+        "See whether units, areas, grips, friction, direction or the state of the specimens differed, and fit each by "
+        "itself."
+    )
+    if words := stresses_apart(model.experiment):
+        return words + advice
     tolerances, is_said = model.tolerances, bool(model.fitted_errors.contradiction)
     if len(tests) < 2 or not (tolerances.stress or tolerances.test) or not model.energy_symbols or is_said:
         return ""
@@ -327,9 +333,7 @@ def _tests_apart(solution: Solution) -> str:
         f"the tests contradict each other: the stress of '{names[highest]}' is {factors[highest]:.2g} times that of "
         f"one material for all, and that of '{names[lowest]}' {factors[lowest]:.2g} times, farther apart than the "
         f"spread of {100 * spread:.0f} % that {'tests of a specimen may have' if is_one_specimen else 'is assumed'}. "
-        "The interval may hold neither. "
-        "See whether units, areas, grips, friction, direction or the state of the specimens differed, and fit each by "
-        "itself."
+        f"The interval may hold neither. {advice}"
     )
 
 
