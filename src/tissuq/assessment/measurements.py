@@ -90,7 +90,7 @@ def _differing_tests(experiment: Experiment) -> Iterator[ResultWarning]:
     differing = []
     for (name, one), (other_name, other) in combinations(labelled, 2):
         is_one = bool(one.specimen) and one.specimen == other.specimen
-        if (is_one or len(labelled) == 2) and (ratios := _ratios(one, other)):
+        if (is_one or len(labelled) == 2) and (ratios := _changing_ratio(one, other)):
             differing.append((abs(ratios[1] - ratios[0]), is_one, f"of '{name}' over that of '{other_name}'", ratios))
     if not differing:
         return
@@ -112,7 +112,7 @@ def _differing_tests(experiment: Experiment) -> Iterator[ResultWarning]:
         )
 
 
-def _ratios(one: Experiment, other: Experiment) -> tuple[float, float, float] | None:
+def _changing_ratio(one: Experiment, other: Experiment) -> tuple[float, float, float] | None:
     """Return the ratio of the stresses of two tests at rest, at the reach of both, and this; None where it is the same.
 
     It is taken to be linear in the strain, by least squares at the points of the first test.
@@ -154,9 +154,9 @@ def _common(one: Experiment, other: Experiment, fewest: int) -> tuple[FloatArray
 
 
 def stresses_apart(experiment: Experiment) -> str:
-    """Return in words that the stress of a test is another than those of tests that were loaded alike; or nothing.
+    """Return in words that a test has another stress than the median of those that were loaded alike; or nothing.
 
-    Than their median, as among many specimens of a tissue two may well differ by more than a pair does.
+    Of many specimens of a tissue the softest and the stiffest may well differ by more than two do.
     """
     labelled = list(zip(labels_of_tests(experiment.tests), experiment.tests, strict=True))
     farthest, words = np.log(MAX_RATIO), ""

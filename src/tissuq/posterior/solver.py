@@ -107,9 +107,8 @@ class Solver:
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice, points = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy)), AdaptedPoints(accuracy)
-        cells = AdaptiveCells(
-            accuracy == FINE, accuracy.tolerance
-        )  # the first noise is the least: of the thinnest ridge
+        # The first value of the noise is the least, where a ridge is thinnest: there it is seen whether any was missed.
+        cells = AdaptiveCells(accuracy == FINE, accuracy.tolerance)
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
