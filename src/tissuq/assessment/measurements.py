@@ -158,34 +158,41 @@ def stresses_apart(experiment: Experiment) -> str:
 
     Of many specimens of a tissue the softest and the stiffest may well differ by more than two do.
     """
-    labelled = list(zip(labels_of_tests(experiment.tests), experiment.tests, strict=True))
-    farthest, words = np.log(MAX_RATIO), ""
-    for name, one in labelled:
-        pairs = [(other_name, _ratio(one, other)) for other_name, other in labelled if other is not one]
-        ratios = {other_name: ratio for other_name, ratio in pairs if ratio is not None}
-        median = float(np.median([*ratios.values()])) if ratios else 1.0
-        if abs(np.log(median)) > farthest:
-            others = f"the median of {len(ratios)} other tests" if len(ratios) > 1 else f"that of '{min(ratios)}'"
-            farthest, words = abs(np.log(median)), f"of '{name}' is {median:.2g} times {others}"
-    return f"the tests contradict each other: the stress {words} where they were loaded alike. " * bool(words)
+    names, tests = labels_of_tests(experiment.tests), experiment.tests
+    ratios: list[dict[int, float]] = [{} for _ in tests]
+    for (number, test), (compared_number, compared) in combinations(enumerate(tests), 2):
+        if ratio := _ratio(test, compared):
+            ratios[number][compared_number], ratios[compared_number][number] = ratio, 1 / ratio
+    medians = {number: float(np.median([*of_test.values()])) for number, of_test in enumerate(ratios) if of_test}
+    farthest = max(medians, key=lambda number: abs(np.log(medians[number])), default=None)
+    if farthest is None or abs(np.log(medians[farthest])) <= np.log(MAX_RATIO):
+        return ""
+    compared_numbers = [*ratios[farthest]]
+    alike = f"the median of {len(compared_numbers)} other tests"
+    if len(compared_numbers) == 1:
+        alike = f"that of '{names[compared_numbers[0]]}'"
+    return (
+        f"the tests contradict each other: the stress of '{names[farthest]}' is {medians[farthest]:.2g} times {alike} "
+        "where they were loaded alike. "
+    )
 
 
-def _ratio(one: Experiment, other: Experiment) -> float | None:
+def _ratio(test: Experiment, compared: Experiment) -> float | None:
     """Return the ratio of the stresses of two tests that were loaded alike; None where little is in common.
 
     Scatter makes least squares of one on the other too small, and the other way round too large: of what is between,
     that which is nearest to one.
     """
-    if common := _common(one, other, MIN_IN_COMMON):
-        _, stress, other_stress, _ = common
-    elif common := _common(other, one, MIN_IN_COMMON):
-        _, other_stress, stress, _ = common
+    if common := _common(test, compared, MIN_IN_COMMON):
+        _, stress, compared_stress, _ = common
+    elif common := _common(compared, test, MIN_IN_COMMON):
+        _, compared_stress, stress, _ = common
     else:
         return None
-    product = float(stress @ other_stress)
+    product = float(stress @ compared_stress)
     if product <= 0:
         return None
-    return float(np.clip(1.0, product / float(other_stress @ other_stress), float(stress @ stress) / product))
+    return float(np.clip(1.0, product / float(compared_stress @ compared_stress), float(stress @ stress) / product))
 
 
 def factors_of_tests(solution: Solution) -> dict[str, float]:
