@@ -13,6 +13,7 @@ from marks import slow_but
 from oracle import FORMULATIONS, brute_force
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.linear import ConditionalGaussian
+from tissuq.inference.reduction import RememberedBases
 from tissuq.mechanics import NeoHookean, Yeoh, material_named, stress_basis
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel
@@ -275,7 +276,7 @@ def test_similar_models_in_turn_have_the_posteriors_that_each_has_by_itself(nois
     models = [StatisticalModel(data, material_named("fung"), discrepancy_named("none"), sd, priors) for sd in noise_sds]
     other_priors = replace(models[0], chosen_priors=priors | {"b": tq.LogUniform(0.02, 1.2)})
     other_law = replace(models[0], material=material_named("demiray"))
-    cells = AdaptiveCells()
+    cells = AdaptiveCells(bases=RememberedBases())
     for model in (*models, other_priors, other_law):
         (in_turn,), (alone,) = cells.solve([model]), AdaptiveCells().solve([model])
         assert in_turn.log_evidence == pytest.approx(alone.log_evidence, abs=2e-6)

@@ -20,7 +20,7 @@ import numpy as np
 from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.box import Boxes
-from tissuq.inference.reduction import BentBases, Reducer, Reduction, Spectrum
+from tissuq.inference.reduction import BasesOf, Reducer, Reduction, Spectrum, bases_of
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
@@ -221,7 +221,7 @@ class ConditionalGaussian:
     that neither the size of the stresses nor nearly dependent columns cost digits.
     """
 
-    def __init__(self, models: Sequence[StatisticalModel], bases: BentBases | None = None) -> None:
+    def __init__(self, models: Sequence[StatisticalModel], bases: BasesOf = bases_of) -> None:
         self.models = tuple(models)
         self.model = self.models[0]
         self._reduce = Reducer(self.models, bases)

@@ -168,26 +168,37 @@ class Reduction:
         return cls(inverse, log_size, centre, squares, *directions)
 
 
-class BentBases:
-    """Mean stresses of unit parameters at values of those in which stresses are not linear: remembered.
+BentSettings = Sequence[tuple[float, ...]]
+"""Values of the parameters in which stresses are not linear."""
+BasesOf = Callable[[StatisticalModel, BentSettings], FloatArray]
+"""Returns the mean stresses (m, n, k) of unit parameters of a model at m settings of the others."""
 
-    They are the same whatever errors the measurements have, and most of the work for laws with fibres. Those of the
-    last material, discrepancy and states; what was not used for longest is forgotten first.
+
+def bases_of(model: StatisticalModel, settings: BentSettings) -> FloatArray:
+    """Return the mean stresses (m, n, k) of unit parameters at m settings of those in which stresses are not linear."""
+    return model.basis(model.states, np.array(settings))
+
+
+class RememberedBases:
+    """`bases_of` that is remembered from one model to others that differ by their errors.
+
+    The stresses are the same then, and most of the work for laws with fibres. Those of the last material, discrepancy
+    and states; what was not used for longest is forgotten first.
     """
 
     def __init__(self) -> None:
         self._of: tuple[Material, Discrepancy, States] | None = None
         self._bases: dict[tuple[float, ...], FloatArray] = {}
 
-    def __call__(self, model: StatisticalModel, settings: Sequence[tuple[float, ...]]) -> FloatArray:
-        """Return the stresses (m, n, k) of a model at m settings of these parameters."""
+    def __call__(self, model: StatisticalModel, settings: BentSettings) -> FloatArray:
+        """Return `bases_of` a model."""
         of = model.material, model.discrepancy, model.states
         if self._of != of:
             self._of, self._bases = of, {}
         distinct = [*dict.fromkeys(settings)]
         used = {setting: self._bases.pop(setting) for setting in distinct if setting in self._bases}
         if new := [setting for setting in distinct if setting not in used]:
-            used |= zip(new, map(np.copy, model.basis(model.states, np.array(new))), strict=True)
+            used |= zip(new, map(np.copy, bases_of(model, new)), strict=True)
         bases = np.array([used[setting] for setting in settings])
         self._bases |= used
         excess = len(self._bases) - MAX_REMEMBERED_VALUES // bases[0].size
@@ -199,8 +210,8 @@ class BentBases:
 class Reducer:
     """Reduces the data of models with the same parts and stretches, given the structure; remembers what it did."""
 
-    def __init__(self, models: Sequence[StatisticalModel], bases: BentBases | None = None) -> None:
-        self._models, self._bases = models, bases or BentBases()
+    def __init__(self, models: Sequence[StatisticalModel], bases: BasesOf = bases_of) -> None:
+        self._models, self._bases = models, bases
         self._known: dict[tuple[float, ...], Reduction] = {}
 
     def __call__(self, settings: FloatArray) -> Reduction:
@@ -227,11 +238,8 @@ class Reducer:
         is_plain = not model.is_correlated and not model.noise.depends_on_level
         if bent:
             blocks_of_designs = _designs(model, settings, self._bases)
-        if bent and is_plain:
-            return [
-                reduction for block in blocks_of_designs for reduction in _of_independent_errors(self._models, block)
-            ]
-        if bent:
+            if is_plain:
+                return [of_one for block in blocks_of_designs for of_one in _of_independent_errors(self._models, block)]
             fits = (_Fit.of(self._models, design) for block in blocks_of_designs for design in block)
             pairs = zip(fits, settings, strict=True)
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
@@ -244,15 +252,12 @@ class Reducer:
         return [reduction for block in blocks for reduction in _reduced(model, self._fit, block)]
 
 
-def _designs(
-    model: StatisticalModel, settings: Sequence[tuple[float, ...]], bases_of: BentBases
-) -> Iterator[FloatArray]:
+def _designs(model: StatisticalModel, settings: BentSettings, bases_of: BasesOf) -> Iterator[FloatArray]:
     """Yield the designs (K, n, k) at the first values of settings, as many as their stresses are computed at once."""
     bent = [setting[: len(model.bent_symbols)] for setting in settings]
     together = max(1, MAX_COMPLEX_STEP_VALUES // (len(model.states) * len(model.column_symbols)))
     for start in range(0, len(bent), together):
-        bases = bases_of(model, bent[start : start + together])
-        columns = bases.swapaxes(0, 1)
+        columns = bases_of(model, bent[start : start + together]).swapaxes(0, 1)
         rows = model.rows(columns.reshape(len(columns), -1))  # of all designs side by side
         yield np.ascontiguousarray(rows.reshape(-1, *columns.shape[1:]).swapaxes(0, 1))
 

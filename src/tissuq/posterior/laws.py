@@ -369,10 +369,8 @@ def _row(posterior: Posterior, best_fit: LeastSquares | None) -> dict[str, Any]:
     ranges_beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
     return {
         "parameters": len(posterior.model.material.parameters),
-        **{
-            name: np.nan if (value := getattr(posterior, name)) is None else value
-            for name in ("log_evidence", "log_evidence_error")
-        },
+        "log_evidence": np.nan if posterior.log_evidence is None else posterior.log_evidence,
+        "log_evidence_error": np.nan if posterior.log_evidence_error is None else posterior.log_evidence_error,
         "r_squared": np.nan if best_fit is None else best_fit.r_squared,
         "nrmse": np.nan if best_fit is None else best_fit.nrmse,
         **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),

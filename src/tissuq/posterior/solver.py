@@ -15,6 +15,7 @@ from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.enumerators.nodes import Guide
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
+from tissuq.inference.reduction import RememberedBases
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model.statistical_model import StatisticalModel
@@ -108,7 +109,7 @@ class Solver:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice, points = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy)), AdaptedPoints(accuracy)
         # The first value of the noise is the least, where a ridge is thinnest: there it is seen whether any was missed.
-        cells = AdaptiveCells(accuracy == FINE, accuracy.tolerance)
+        cells = AdaptiveCells(accuracy == FINE, accuracy.tolerance, bases=RememberedBases())
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from tissuq.inference.enumerators.line import FINE
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
     START_PROBABILITIES,
-    Cells,
     Lines,
     Quadrature,
     has_missed,
@@ -32,7 +31,7 @@ from tissuq.inference.enumerators.survey import (
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
-from tissuq.inference.reduction import BentBases
+from tissuq.inference.reduction import BasesOf, bases_of
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
 from tissuq.model.statistical_model import StatisticalModel
@@ -61,14 +60,14 @@ class AdaptiveCells:
         Of the interpolation, relative to the integral.
     start : Start, optional
         Cells at which the next model begins: those of the most probable one so far, unless they had become many.
-    bases : BentBases
-        Stresses that are remembered from one model to the next.
+    bases : callable
+        Returns the stresses of unit parameters; it may remember them from one model to the next.
     """
 
     is_checked: bool = True
     tolerance: float = FINE.tolerance
     start: Start | None = None
-    bases: BentBases = field(default_factory=BentBases)
+    bases: BasesOf = bases_of
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why quadrature does not serve a model; nothing where it does."""
@@ -122,23 +121,22 @@ class AdaptiveCells:
         """Integrate models together, or a single one from where the most probable one was."""
         integration = _Integration(models, self)
         if len(models) == 1 and integration.warp and (rule := integration.rule):
-            count, start, log_integral = len(rule.cells.lower), integration.start, float(rule.log_integral[0])
+            count, start = len(rule.cells.lower), integration.start
             fewest = start.fewest if start else count
-            if not start or log_integral > start.log_integral:
-                reached = Start(integration.priors[0], integration.warp, rule.cells, fewest, log_integral)
+            if not start or rule.log_integral[0] > start.rule.log_integral[0]:
+                reached = Start(integration.priors[0], integration.warp, rule, fewest)
                 self.start = reached if count <= MAX_GROWTH * fewest else None
             self.is_checked = False
         return integration
 
 
 class Start(NamedTuple):
-    """Cells in the coordinates of a warp of parameters with priors, and their number for the first such model."""
+    """A rule in the coordinates of a warp of parameters with priors, and how many cells the first model had there."""
 
     priors: Sequence[Prior]
     warp: Warp
-    cells: Cells
+    rule: Quadrature
     fewest: int
-    log_integral: float
 
 
 class _Integration:
@@ -155,12 +153,11 @@ class _Integration:
         self.rule: Quadrature | None = None
         self.warp: Warp | None = None
         if self.dimension:
-            first_cells = self.start.cells if self.start else None
-            self.warp = (
-                self.start.warp
-                if self.start
-                else warp_along(survey(self.priors, len(models[0].structure), self._log_ceiling))
-            )
+            if self.start:
+                self.warp, first_cells = self.start.warp, self.start.rule.cells
+            else:
+                region = survey(self.priors, len(models[0].structure), self._log_ceiling)
+                self.warp, first_cells = warp_along(region), None
             self.rule = integrate(self._log_integrand, self.dimension, cells.tolerance, first_cells)
             self.settings = self.warp.parameters(self.rule.points)[0]
         else:
