@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import product
 
 import numpy as np
 import pytest
@@ -135,6 +136,30 @@ def test_importance_sampling_and_nuts_agree():
         assert first.mean == pytest.approx(second.mean, abs=0.1 * first.sd)  # 4 standard errors of NUTS's mean
         assert first.sd == pytest.approx(second.sd, rel=0.1)
         assert other.rhat[symbol] < 1.01
+
+
+def test_a_wrong_model_does_not_take_the_initial_stiffness_unless_it_is_said_to_be_right():
+    emulator = emulate(designed(neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, 8), DEPTH)
+    wrong = measured(lambda p: neo_hooke(p) * (1 + DEPTH), {"C10": 1.2}, 0.01)
+    options = {"priors": {"C10": tq.Uniform(0.2, 5.0)}, "noise_sd": 0.01, "emulator": emulator}
+    found = tq.calibrate(DEPTH, wrong, neo_hooke, **options)
+    low, high = found.marginals["C10"].hdi()
+    assert found.problem.discrepancy.name == "gp-pinned"
+    assert low < 1.2 < high
+    assert not [warning for warning in found.warnings if warning.code == "no-discrepancy"]
+    taken_for_right = tq.calibrate(DEPTH, wrong, neo_hooke, **options, discrepancy="none")
+    assert taken_for_right.marginals["C10"].hdi()[0] > 1.2
+    assert [warning for warning in taken_for_right.warnings if warning.code == "no-discrepancy"]
+
+
+def test_data_in_another_unit_are_no_discrepancy():
+    priors = {"C10": tq.Uniform(0.2, 5.0)}
+    emulator = emulate(designed(neo_hooke, priors, 8), DEPTH)
+    data = measured(neo_hooke, {"C10": 1.2}, 0.01)
+    for factor, noise_sd in product([1, 1e3, 1e-3], [0.01, "unknown"]):
+        sd = noise_sd if noise_sd == "unknown" else factor * noise_sd
+        found = tq.calibrate(DEPTH, factor * data, neo_hooke, priors, noise_sd=sd, emulator=emulator)
+        assert any(warning.code == "unmodelled-curve" for warning in found.warnings) == (factor != 1)
 
 
 @pytest.mark.slow

@@ -69,6 +69,25 @@ def test_each_has_noise_and_discrepancy_of_its_own(discrepancy):
     np.testing.assert_allclose(new.std(axis=0), np.sqrt(np.diag(spread)), rtol=0.05)
 
 
+def test_what_was_measured_at_one_control_has_no_discrepancy_and_is_said_to_have_none():
+    control = {"force": CONTROL["force"], "shift": np.full(2, 0.5)}
+    data = {"force": 3 * control["force"], "shift": [6.1e-7, 5.8e-7]}
+    found = tq.calibrate(control, data, linear, PRIORS, noise_sd=NOISE, runs=10)
+    assert found.problem.symbols == ("k", "m", "c_force", "psi_force")
+    s = control["force"][:, None] / 0.5
+    kernel = np.exp(-0.5 * (s - s.T) ** 2) - np.exp(-0.5 * (s**2 + s.T**2)) * (1 + s * s.T)
+    of_force = multivariate_normal(2.8 * control["force"], 0.2**2 * kernel + NOISE["force"] ** 2 * np.eye(8))
+    of_shift = multivariate_normal(0.4e-6 * np.full(2, 1.5) * 1e6, (NOISE["shift"] * 1e6) ** 2 * np.eye(2))
+    expected = of_force.logpdf(data["force"]) + of_shift.logpdf(1e6 * np.array(data["shift"])) + 2 * np.log(1e6)
+    exact = Likelihood(found.problem, found.emulator, has_error=False)
+    assert exact.log_density(np.array([[1.6, 1.2, 0.2, 0.5]]))[0] == pytest.approx(expected, rel=1e-5)
+    (text,) = [text for text in found.warnings if text.code == "no-discrepancy"]
+    assert text.startswith("of shift, measured at one control, no error of the forward model is allowed for")
+    alone = tq.calibrate(control["shift"], data["shift"], lambda p, x: 1e-6 * p["k"] * x, {"k": tq.Uniform(0.5, 3)},
+                         noise_sd=2e-7, runs=6)  # fmt: skip
+    assert alone.problem.discrepancy.name == "none"
+
+
 @pytest.mark.slow
 def test_a_quantity_of_a_small_unit_is_emulated_as_well_as_the_other():
     def curved(parameters, control):

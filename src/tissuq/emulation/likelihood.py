@@ -15,7 +15,7 @@ from jax.scipy.linalg import block_diag, cho_solve, solve_triangular
 from tissuq.arrays import FloatArray
 from tissuq.emulation.emulator import Emulator, emulated
 from tissuq.emulation.kriging import Kernel, Trend
-from tissuq.emulation.problem import PriorCorrelation, Problem, symbol_of
+from tissuq.emulation.problem import PriorCorrelation, Problem, has_process, symbol_of
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.priors import Prior
@@ -108,16 +108,15 @@ def _moments(form: Form, values: Any, data: Mapping[str, Any]) -> tuple[Any, Any
     for name, start, stop in form.quantities:
         control = data["control"][start:stop]
         rounding.append(jnp.full(stop - start, ROUNDING_SHARE * jnp.abs(data["measured"][start:stop]).max()))
+        if not has_process(form.discrepancy, name, form.symbols):
+            blocks.append(jnp.zeros((stop - start, stop - start)))
+            continue
         hyperparameters = {
             parameter.symbol: values_by_symbol[symbol_of(parameter.symbol, name)]
             for parameter in form.discrepancy.parameters
         }
-        blocks.append(
-            form.discrepancy.correlated_variance(hyperparameters)
-            * form.discrepancy.kernel(0, control, control, hyperparameters)
-            if form.discrepancy.is_correlated
-            else jnp.zeros((stop - start, stop - start))
-        )
+        kernel = form.discrepancy.kernel(0, control, control, hyperparameters)
+        blocks.append(form.discrepancy.correlated_variance(hyperparameters) * kernel)
     return (
         mean,
         data["has_error"] * error,

@@ -142,6 +142,11 @@ class Problem:
         """The parameters of the forward model."""
         return tuple(self.forward_priors)
 
+    @property
+    def without_discrepancy(self) -> tuple[str, ...]:
+        """The quantities without a discrepancy, which at one control cannot be told from the model."""
+        return tuple(name for name in self.quantities if not has_process(self.discrepancy, name, self.symbols))
+
     def values_of(self, scores: FloatArray) -> FloatArray:
         """Return parameters (N, D) whose joint prior is that of independent standard normal scores (N, D).
 
@@ -160,7 +165,7 @@ def pose(
     control: ArrayLike | Mapping[str, ArrayLike],
     measured: ArrayLike | Mapping[str, ArrayLike],
     priors: Mapping[str, Prior],
-    discrepancy: str | Discrepancy = "none",
+    discrepancy: str | Discrepancy = "gp-pinned",
     noise_sd: float | str | Mapping[str, float | str] = "unknown",
     zero_load: float = 0.0,
     correlations: Mapping[tuple[str, str], float] | None = None,
@@ -175,7 +180,7 @@ def pose(
         Prior of each parameter of the forward model; and, to replace the defaults, of ``c``, ``psi`` and ``noise_sd``
         (with several quantities ``c_NAME`` and so on).
     discrepancy : str or Discrepancy
-        ``"none"``, ``"gp"`` or ``"gp-pinned"``, a process of the control.
+        ``"none"``, ``"gp"`` or ``"gp-pinned"``, a process of the control; a quantity at one control alone has none.
     noise_sd : float or str, or a mapping of them
         Standard deviation of the noise in the unit of what was measured, or ``"unknown"``.
     zero_load : float
@@ -199,7 +204,8 @@ def pose(
         sd = noises[name]
         if sd != "unknown" and not (isinstance(sd, Real) and 0 < float(sd) < inf):
             raise InputError(f"noise_sd must be a positive number or 'unknown', not {sd!r}.")
-        for parameter in (*form.parameters, *(() if sd != "unknown" else (NOISE_SD,))):
+        of_process = form.parameters if np.ptp(controls) else ()
+        for parameter in (*of_process, *(() if sd != "unknown" else (NOISE_SD,))):
             symbol = symbol_of(parameter.symbol, name)
             error_priors[symbol] = priors.get(symbol) or _default_prior(parameter, controls, values)
             if isinstance(error_priors[symbol], Prior):
@@ -209,6 +215,8 @@ def pose(
             raise InputError(
                 f"a prior of {symbol} is given, and the noise, too ({sd:g}): leave out one of --prior and --noise-sd."
             )
+    if not any(np.ptp(controls) for controls, _ in columns.values()):
+        form = NoDiscrepancy()
     forward = {symbol: prior for symbol, prior in priors.items() if symbol not in error_priors}
     _check_priors(forward, error_priors)
     ends = np.cumsum([0, *(len(values) for _, values in columns.values())]).tolist()
@@ -228,6 +236,11 @@ def pose(
 def symbol_of(symbol: str, quantity: str) -> str:
     """Return the symbol of an error's parameter for a quantity, such as c_force; with a single quantity c."""
     return f"{symbol}_{quantity}" if quantity else symbol
+
+
+def has_process(discrepancy: Discrepancy, quantity: str, symbols: Sequence[str]) -> bool:
+    """Return whether a quantity has a process as discrepancy, the parameters of which are among all symbols."""
+    return discrepancy.is_correlated and all(symbol_of(of.symbol, quantity) in symbols for of in discrepancy.parameters)
 
 
 def is_far(control: FloatArray, zero_load: float) -> bool:
@@ -306,11 +319,6 @@ def _default_prior(parameter: Parameter, control: FloatArray, measured: FloatArr
     """Return the default prior of a parameter, in units of the data."""
     is_length = parameter.dimension == "stretch"
     unit = float(np.ptp(control) if is_length else np.abs(measured).max())
-    if not unit:
-        raise ModelError(
-            f"all measurements are at one control, so that the {parameter.description} {parameter.symbol} cannot be "
-            "identified: choose the discrepancy 'none'."
-        )
     assert parameter.relative_prior is not None  # noqa: S101  (those of scales and lengths have one)
     return parameter.relative_prior.scaled(unit)
 

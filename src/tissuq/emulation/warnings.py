@@ -146,6 +146,12 @@ def calibration_warnings(
             symbols=[symbol for symbol, _ in at_bounds],
         )
     yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
+    if problem.discrepancy.is_correlated and problem.without_discrepancy:
+        yield ResultWarning(
+            f"of {', '.join(problem.without_discrepancy)}, measured at one control, no error of the forward model "
+            "is allowed for: where the model is wrong there, the parameters are over-confident.",
+            "no-discrepancy",
+        )
 
 
 def _no_parameters_fit(
@@ -160,8 +166,7 @@ def _no_parameters_fit(
     of_discrepancy = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
     misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, of_discrepancy])).min())
     is_out = (measured < outputs.min(axis=0)) | (measured > outputs.max(axis=0))
-    is_absorbed = problem.discrepancy.name == "gp" or None in problem.noise_sd.values()  # by what is unknown
-    is_out_of_reach = is_absorbed and is_out.mean() > MAX_SHARE_OUT_OF_REACH
+    is_out_of_reach = _is_out_of_reach(problem, outputs)
     predicted = likelihood.predictions(draws, discrepancy=False, noise=False)[0]
     is_noise = _noise_is_misfit(problem, np.vstack([outputs, predicted]))
     if gammaincc(0.5 * size, 0.5 * misfit) > MIN_MISFIT_PROBABILITY and not is_out_of_reach and not is_noise:
@@ -193,6 +198,22 @@ def _no_parameters_fit(
         "unmodelled-curve",
         Severity.PROBLEM,
     )
+
+
+def _is_out_of_reach(problem: Problem, outputs: FloatArray) -> bool:
+    """Return whether so many measurements are beyond all outputs (N, n) that what is unknown takes up a wrong model.
+
+    A process that is pinned does so where all in the half of a quantity nearest to zero load, which it changes least,
+    are beyond the outputs by more than these differ.
+    """
+    low, high = outputs.min(axis=0), outputs.max(axis=0)
+    beyond = np.maximum(low - problem.measured, problem.measured - high)
+    if isinstance(problem.discrepancy, PinnedProcess):
+        distance = np.abs(problem.control - problem.discrepancy.references[0])
+        ends = [slice(*quantity) for quantity in problem.quantities.values()]
+        return any((beyond > high - low)[of][distance[of] <= np.median(distance[of])].all() for of in ends)
+    is_absorbed = problem.discrepancy.is_correlated or None in problem.noise_sd.values()
+    return bool(is_absorbed and (beyond > 0).mean() > MAX_SHARE_OUT_OF_REACH)
 
 
 def _without_effect(problem: Problem, posterior: SampledPosterior, totals: Mapping[str, float]) -> Iterator[str]:
@@ -230,9 +251,8 @@ def _noise_is_misfit(problem: Problem, predicted: FloatArray) -> bool:
 
     Of a quantity without a discrepancy it is one that is large beside the measurements' scatter about a smooth curve.
     """
-    if problem.discrepancy.is_correlated:
-        return False
-    for name, (start, stop) in problem.quantities.items():
+    for name in problem.without_discrepancy:
+        start, stop = problem.quantities[name]
         control, measured = problem.control[start:stop], problem.measured[start:stop]
         scattered = scatter(control, measured)
         if problem.noise_sd[name] is None and scattered is not None:

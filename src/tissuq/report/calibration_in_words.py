@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from math import inf
 
+import numpy as np
+
 from tissuq.assessment.uses import MIN_INSIDE, Use, Verdict, precision_of, relative_half_width, worst_of
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.problem import is_far
@@ -172,7 +174,8 @@ def next_step_of(study: CalibrationStudy, uses: Sequence[Use]) -> str:
         return f"give {bounded} a wider --prior, and repeat the command with --force; keep a bound that nature sets."
     if _share_of_emulator(study) > LARGE_SHARE:
         return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."
-    if not isinstance(calibration.problem.discrepancy, PinnedProcess) or _takes_stiffness(study):
+    has_curves = any(np.ptp(measured.control) for measured in study.data.values())
+    if has_curves and (not isinstance(calibration.problem.discrepancy, PinnedProcess) or _takes_stiffness(study)):
         is_unknown = any(is_far(measured.control, study.settings.zero_load) for measured in study.data.values())
         at = " --zero-load C, C the control at which there is no load (of stretches 1)" if is_unknown else ""
         return f"let the forward model be wrong: repeat the command with --discrepancy gp-pinned --force{at}."

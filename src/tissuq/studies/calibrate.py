@@ -45,7 +45,7 @@ def calibrate(
     forward: Forward | Callable[..., Any] | Mapping[str | tuple[str, ...], Forward | Callable[..., Any]],
     priors: Mapping[str, Prior],
     *,
-    discrepancy: str | Discrepancy = "none",
+    discrepancy: str | Discrepancy = "gp-pinned",
     noise_sd: float | str | Mapping[str, float | str] = "unknown",
     zero_load: float = 0.0,
     correlations: Mapping[tuple[str, str], float] | None = None,
@@ -76,8 +76,9 @@ def calibrate(
         Of every parameter of the model: together they say where it is run. And, to replace the usual ones, of the
         discrepancy's ``c`` and ``psi`` and of ``noise_sd``.
     discrepancy : str
-        ``"none"``, ``"gp"``, or ``"gp-pinned"``: zero with its slope at zero load, which leaves the initial stiffness
-        to the parameters.
+        The model's error: ``"gp-pinned"``, a process of the control that is zero with its slope at zero load, which
+        leaves the initial stiffness to the parameters; ``"gp"``, which takes a share of that; or ``"none"`` of a model
+        that is right. A quantity that was measured at one control has none.
     noise_sd : float or ``"unknown"``, or mapping of str to them
         Standard deviation of the noise.
     zero_load : float

@@ -107,7 +107,9 @@ class CalibrationSettings(ModelSettings):
         None, "Column of the control [the first of two; with several --qoi the only other one].", parse=column
     )
     measured: str | int | None = option(None, "Column of the measured values [the second of two].", parse=column)
-    discrepancy: str = option("none", "none, gp, or gp-pinned (zero with its slope at zero load).")
+    discrepancy: str = option(
+        "gp-pinned", "The model's error: gp-pinned (zero with its slope at zero load), gp, or none [gp-pinned]."
+    )
     noise_sd: float | Literal["unknown"] | dict[str, float | Literal["unknown"]] = option(
         "unknown",
         "Sd of the noise, in the unit of the measured values, or unknown; with several --qoi NAME=SD,NAME=SD.",
