@@ -298,11 +298,18 @@ def test_of_several_models_the_one_that_fails_is_named_and_each_gets_its_control
 
 
 def test_a_model_that_asks_for_a_parameter_without_a_prior_is_told_which_there_are():
-    def force(parameters):
-        return parameters["alpha"] * DEPTH
+    for name, words in (
+        ("alpha", r"'alpha' \(there are priors of C10\)"),
+        (3, r"3 \(there are priors of C10\)"),
+        ("c", r"'c' \(there are priors of C10; c is of the discrepancy or the noise: give the model's another name\)"),
+    ):
 
-    with pytest.raises(InputError, match=r"KeyError: 'alpha' \(there are priors of C10\)"):
-        tq.calibrate(DEPTH, neo_hooke({"C10": 1.0}), force, PRIORS, runs=16)
+        def force(parameters, name=name):
+            return parameters[name] * DEPTH
+
+        priors = PRIORS | ({"c": tq.Uniform(0.1, 1)} if name == "c" else {})
+        with pytest.raises(InputError, match=f"KeyError: {words}"):
+            tq.calibrate(DEPTH, neo_hooke({"C10": 1.0}), force, priors, runs=16)
 
 
 @pytest.mark.slow

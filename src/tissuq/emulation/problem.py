@@ -28,6 +28,8 @@ DISCREPANCIES: dict[str, type[Discrepancy]] = {
     kind.name: kind for kind in (NoDiscrepancy, GaussianProcess, PinnedProcess)
 }
 """Discrepancies that need no material."""
+ERROR_SYMBOLS = {of.symbol for kind in DISCREPANCIES.values() for of in (*kind().parameters, NOISE_SD)}
+"""Parameters of the discrepancies and the noise, which a parameter of the model cannot be called."""
 PROBABILITIES = 1e-300, 1 - 2 * np.finfo(float).epsneg
 """The least and the largest probability at which a prior's quantile is finite."""
 

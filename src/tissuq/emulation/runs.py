@@ -13,7 +13,7 @@ import numpy as np
 
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.emulation.forward import Forward, UnreadableError
-from tissuq.emulation.problem import PriorCorrelation
+from tissuq.emulation.problem import ERROR_SYMBOLS, PriorCorrelation
 from tissuq.errors import InputError
 from tissuq.parameters.priors import Prior
 
@@ -134,8 +134,10 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     except UnreadableError:
         raise
     except Exception as error:  # a failed run is a result, which is listed
-        is_missing = isinstance(error, KeyError) and not {*error.args} & {*dict(run.parameters)}
-        what_to_do = f" (there are priors of {', '.join(dict(run.parameters))})" * is_missing
+        missing = {*error.args} - {*dict(run.parameters)} if isinstance(error, KeyError) else set()
+        taken = f"; {', '.join(map(str, missing))} is of the discrepancy or the noise: give the model's another name"
+        there_are = f"there are priors of {', '.join(dict(run.parameters))}{taken * bool(missing & ERROR_SYMBOLS)}"
+        what_to_do = f" ({there_are})" * bool(missing)
         result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300] + what_to_do
     else:
         result |= _checked(outputs, run)

@@ -74,7 +74,7 @@ def calibrate(
         names of what they give: ``{"force": indentation, ("pull", "neck"): tension}``.
     priors : mapping of str to Prior
         Of every parameter of the model: together they say where it is run. And, to replace the usual ones, of the
-        discrepancy's ``c`` and ``psi`` and of ``noise_sd``.
+        discrepancy's ``c`` and ``psi`` and of ``noise_sd``, as no parameter of the model can be called.
     discrepancy : str
         The model's error: ``"gp-pinned"``, a process of the control that is zero with its slope at zero load, which
         leaves the initial stiffness to the parameters; ``"gp"``, which takes a share of that; or ``"none"`` of a model
