@@ -81,7 +81,9 @@ def found(block, computed, tmp_path_factory):
     noise = NOISE_SD * np.random.default_rng(5).standard_normal(len(DEPTH))
     measured = computed(*TRUTH.values()) + noise
     folder = tmp_path_factory.mktemp("calibrated") / "runs"
-    return measured, tq.calibrate(DEPTH, measured, block, PRIORS, noise_sd=NOISE_SD, runs=20, folder=folder)
+    return measured, tq.calibrate(
+        DEPTH, measured, block, PRIORS, discrepancy="none", noise_sd=NOISE_SD, runs=20, folder=folder
+    )
 
 
 def test_the_intervals_hold_the_parameters_of_the_model_that_made_the_data(found):
@@ -139,7 +141,9 @@ def test_force_and_displacement_of_a_point_together_are_those_on_a_grid_of_runs(
     exact, generator = computed(0.0015, -5.5), np.random.default_rng(8)
     sds = {"force": NOISE_SD, "bulge": BULGE_SD}
     measured = {name: exact[name] + sds[name] * generator.standard_normal(len(at)) for name, at in controls.items()}
-    calibration = tq.calibrate(controls, measured, both, SOFT, noise_sd=sds, runs=20, folder=tmp_path / "calibrated")
+    calibration = tq.calibrate(
+        controls, measured, both, SOFT, discrepancy="none", noise_sd=sds, runs=20, folder=tmp_path / "calibrated"
+    )
 
     def misfit(point):
         found = computed(*point)
@@ -168,7 +172,9 @@ def test_two_models_of_one_tissue_together_are_those_on_a_grid_of_runs(block, fo
     measured = {name: exact[name] + NOISE_SD * generator.standard_normal(len(at)) for name, at in controls.items()}
     together = {"press": block, "pull": pulled}
     sds = dict.fromkeys(controls, NOISE_SD)
-    calibration = tq.calibrate(controls, measured, together, SOFT, noise_sd=sds, runs=20, folder=tmp_path / "both")
+    calibration = tq.calibrate(
+        controls, measured, together, SOFT, discrepancy="none", noise_sd=sds, runs=20, folder=tmp_path / "both"
+    )
 
     def misfit(point):
         return sum((((curve - measured[name]) / NOISE_SD) ** 2).sum() for name, curve in computed(*point).items())
@@ -176,7 +182,9 @@ def test_two_models_of_one_tissue_together_are_those_on_a_grid_of_runs(block, fo
     hold_against_grid(calibration, misfit)
     for name, model in together.items():
         folder = tmp_path / f"{name}-alone"
-        alone = tq.calibrate(controls[name], measured[name], model, SOFT, noise_sd=NOISE_SD, runs=20, folder=folder)
+        alone = tq.calibrate(
+            controls[name], measured[name], model, SOFT, discrepancy="none", noise_sd=NOISE_SD, runs=20, folder=folder
+        )
         assert all(calibration.marginals[symbol].sd < alone.marginals[symbol].sd for symbol in TRUTH)
     with pytest.raises(tq.InputError, match="the models give press, pull; what was measured is press, neck"):
         tq.calibrate({"press": DEPTH, "neck": travel}, {"press": DEPTH, "neck": travel}, together, SOFT)

@@ -47,7 +47,7 @@ def test_the_density_is_that_of_a_gaussian_with_all_three_errors(discrepancy):
 def test_a_proportional_model_gives_the_closed_form():
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)
     priors = {"C10": tq.Normal(1.0, 0.4)}
-    found = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.05, runs=8)
+    found = tq.calibrate(DEPTH, data, neo_hooke, priors, discrepancy="none", noise_sd=0.05, runs=8)
     column = neo_hooke({"C10": 1.0})
     precision = 0.4**-2 + column @ column / 0.05**2
     mean = (1.0 / 0.4**2 + column @ data / 0.05**2) / precision
@@ -67,7 +67,7 @@ def test_a_proportional_model_gives_the_closed_form():
 def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     data = measured(ogden, TRUTH, 0.2)
     emulator = emulate(designed(ogden, OGDEN, 9), DEPTH)
-    found = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.2, emulator=emulator)
+    found = tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", noise_sd=0.2, emulator=emulator)
     mu, alpha = np.meshgrid(np.linspace(0.7, 2.4, 60), np.linspace(-13, -5.5, 60), indexing="ij")
     mean, cov = emulator.moments(np.column_stack([mu.ravel(), alpha.ravel()]))
     cov = cov + 0.2**2 * np.eye(len(DEPTH))
@@ -193,7 +193,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emu
         emulator = emulate(designed(ogden, OGDEN, 7, seed=number), DEPTH)
         noise = 1e-3 * ogden(truth).max()
         data = measured(ogden, truth, noise, seed=number)
-        found = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=noise, emulator=emulator, seed=number)
+        found = tq.calibrate(
+            DEPTH, data, ogden, OGDEN, discrepancy="none", noise_sd=noise, emulator=emulator, seed=number
+        )
         for each, results in ((found, inside), (found.without_emulator_error, exact)):
             low, high = each.marginals["alpha"].hdi()
             results.append(low <= truth["alpha"] <= high)
@@ -204,8 +206,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emu
 @pytest.mark.slow
 def test_further_runs_are_made_where_the_posterior_is_until_the_emulator_is_good_enough():
     data = measured(ogden, TRUTH, 0.02)
-    few = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.02, runs=8)
-    more = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.02, runs=8, refine=24)
+    few = tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", noise_sd=0.02, runs=8)
+    more = tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", noise_sd=0.02, runs=8, refine=24)
     assert more.error_ratio < 0.02 < few.error_ratio
     assert 8 < len(more.runs) < 8 + 24
     added = more.runs.points[8:]
@@ -267,7 +269,7 @@ def test_the_search_does_not_end_where_the_emulator_knows_nothing():
 
     emulator = emulate(designed(spring, priors, 12), DEPTH)
     data = measured(spring, {"k": 1.5, "b": 0.8}, 0.001)
-    found = tq.calibrate(DEPTH, data, spring, priors, noise_sd=0.001, emulator=emulator)
+    found = tq.calibrate(DEPTH, data, spring, priors, discrepancy="none", noise_sd=0.001, emulator=emulator)
     assert abs(found.marginals["k"].mean - 1.5) < 0.05
     assert abs(found.marginals["b"].mean - 0.8) < 0.1
 
@@ -275,10 +277,12 @@ def test_the_search_does_not_end_where_the_emulator_knows_nothing():
 @pytest.mark.slow
 def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     data = measured(ogden, TRUTH, 0.001)
-    poor = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.001, runs=7)
+    poor = tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", noise_sd=0.001, runs=7)
     assert any("emulator's error is large beside the noise" in text for text in poor.warnings)
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)
-    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 1.18)}, noise_sd=0.02, runs=6)
+    found = tq.calibrate(
+        DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 1.18)}, discrepancy="none", noise_sd=0.02, runs=6
+    )
     assert any("reaches the bound of the prior of C10 (upper)" in text for text in found.warnings)
     assert symbols_in(found.warnings, "prior-bound") == ("C10",)
 
@@ -286,11 +290,17 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
 def test_a_parameter_that_the_model_does_not_use_is_named_and_one_that_is_hardly_known_is_not():
     priors = {"C10": tq.Uniform(0.2, 5.0), "c10": tq.Uniform(0.2, 5.0)}
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)
-    found = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, runs=10)
+    found = tq.calibrate(DEPTH, data, neo_hooke, priors, discrepancy="none", noise_sd=0.02, runs=10)
     (text,) = [text for text in found.warnings if "hardly depends on" in text]
     assert text.startswith("the model hardly depends on c10, and")
     both = tq.calibrate(
-        DEPTH, data, lambda p: neo_hooke({"C10": p["C10"] + 0.1 * p["c10"]}), priors, noise_sd=0.02, runs=10
+        DEPTH,
+        data,
+        lambda p: neo_hooke({"C10": p["C10"] + 0.1 * p["c10"]}),
+        priors,
+        discrepancy="none",
+        noise_sd=0.02,
+        runs=10,
     )
     assert not any("hardly depends on" in text for text in both.warnings)
 
@@ -310,7 +320,7 @@ def test_an_emulator_that_hides_what_the_measurements_tell_is_told_and_no_parame
 
     noise = 0.02 * np.random.default_rng(5).standard_normal((2, 12))[batch]
     data = exponential({"mu": 0.4, "b": 1.5, "k": 0.3}) + noise
-    found = tq.calibrate(depth, data, exponential, priors, noise_sd=0.02, runs=40, seed=1)
+    found = tq.calibrate(depth, data, exponential, priors, discrepancy="none", noise_sd=0.02, runs=40, seed=1)
     assert found.error_ratio > 1000
     assert any("the emulator's error is large" in text for text in found.warnings)
     assert not any("hardly depends on" in text for text in found.warnings)
@@ -340,10 +350,10 @@ def test_measurements_that_no_parameters_give_are_told():
         (measured(neo_hooke, {"C10": 2.0}, 0.02), True),
         (measured(lambda p: neo_hooke(p) * (1 + 5 * DEPTH), {"C10": 0.4}, 0.02), True),
     ):
-        found = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, emulator=emulator)
+        found = tq.calibrate(DEPTH, data, neo_hooke, priors, discrepancy="none", noise_sd=0.02, emulator=emulator)
         told = [text for text in found.warnings if words in text]
         assert len(told) == is_told
-    unknown = tq.calibrate(DEPTH, 3 * neo_hooke({"C10": 1.0}), neo_hooke, priors, emulator=emulator)
+    unknown = tq.calibrate(DEPTH, 3 * neo_hooke({"C10": 1.0}), neo_hooke, priors, discrepancy="none", emulator=emulator)
     (text,) = [text for text in unknown.warnings if words in text]
     assert "15 of 15 measurements are beyond the outputs of all runs" in text
     admitted = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, emulator=emulator, discrepancy="gp-pinned")
@@ -355,7 +365,7 @@ def test_measurements_that_no_parameters_give_are_told():
 def test_where_no_parameters_fit_the_nearest_run_is_named_and_no_shift_of_means(noise):
     """A force that falls with the depth, which within its range no parameters of the model do."""
     data = 2.0 - 5.0 * DEPTH + 0.02 * np.random.default_rng(3).standard_normal(len(DEPTH))
-    found = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=noise, runs=20)
+    found = tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", noise_sd=noise, runs=20)
     (text,) = [text for text in found.warnings if "no parameters that the priors allow" in text]
     points, outputs = found.runs.good
     off = np.sqrt(((outputs - data) ** 2).mean(axis=1))
@@ -369,13 +379,13 @@ def test_where_no_parameters_fit_the_nearest_run_is_named_and_no_shift_of_means(
 @pytest.mark.slow
 def test_a_small_error_of_the_model_is_left_to_an_unknown_noise():
     data = measured(ogden, TRUTH, 0.005) * (1 + 0.05 * np.sin(20 * DEPTH))
-    found = tq.calibrate(DEPTH, data, ogden, OGDEN, runs=16)
+    found = tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", runs=16)
     assert not any("no parameters" in text for text in found.warnings)
 
 
 @pytest.mark.slow
 def test_the_table_of_runs_left_out_has_the_worst_first():
-    found = tq.calibrate(DEPTH, measured(ogden, TRUTH, 0.05), ogden, OGDEN, noise_sd=0.05, runs=12)
+    found = tq.calibrate(DEPTH, measured(ogden, TRUTH, 0.05), ogden, OGDEN, discrepancy="none", noise_sd=0.05, runs=12)
     table, check = found.leave_one_out, found.check
     assert list(table.columns) == ["mu", "alpha", "error", "sd", "standardised"]
     assert table["error"].is_monotonic_decreasing
@@ -407,7 +417,7 @@ def test_a_saved_calibration_is_read_by_xarray(tmp_path):
     import xarray as xr
 
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)
-    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, runs=8)
+    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, discrepancy="none", runs=8)
     found.save(tmp_path / "found.nc")
     tree = xr.open_datatree(tmp_path / "found.nc", engine="h5netcdf")
     assert tree["posterior"]["C10"].dims == ("chain", "draw")
@@ -453,9 +463,9 @@ def test_an_emulator_of_other_controls_or_parameters_is_refused():
     emulator = emulate(designed(neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, 8), DEPTH)
     data = neo_hooke({"C10": 1.0})
     with pytest.raises(InputError, match="other controls"):
-        tq.calibrate(2 * DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, emulator=emulator)
+        tq.calibrate(2 * DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, discrepancy="none", emulator=emulator)
     with pytest.raises(InputError, match="emulator is one of C10"):
-        tq.calibrate(DEPTH, data, ogden, OGDEN, emulator=emulator)
+        tq.calibrate(DEPTH, data, ogden, OGDEN, discrepancy="none", emulator=emulator)
 
 
 @pytest.mark.parametrize("prior", [tq.HalfNormal(2.0), tq.Normal(1.0, 2.0), tq.LogNormal(1.0, 0.5), tq.Uniform(0, 3)])
@@ -473,7 +483,16 @@ def test_a_posterior_like_its_prior_is_not_beyond_the_runs_that_lie_as_it_does(s
     """Of 8 runs either end leaves out about a sixteenth of the prior, and of the posterior as much."""
     data = neo_hooke({"C10": 2.0})
     noise_sd = 0.2 * float(np.linalg.norm(neo_hooke({"C10": 1.0})))  # says as much as a prior with the sd 0.2, or 10 %
-    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.LogNormal(2.0, 0.05)}, noise_sd=noise_sd, runs=8, seed=seed)
+    found = tq.calibrate(
+        DEPTH,
+        data,
+        neo_hooke,
+        {"C10": tq.LogNormal(2.0, 0.05)},
+        discrepancy="none",
+        noise_sd=noise_sd,
+        runs=8,
+        seed=seed,
+    )
     draws, runs = found.draws(2000)[:, 0], found.runs.points
     assert max(np.mean(draws < runs.min()), np.mean(draws > runs.max())) > 0.02
     assert not any("beyond the runs" in text for text in found.warnings)
@@ -482,7 +501,9 @@ def test_a_posterior_like_its_prior_is_not_beyond_the_runs_that_lie_as_it_does(s
 @pytest.mark.slow
 def test_a_posterior_beyond_all_runs_is_told_as_such_and_not_as_the_bound_of_a_prior():
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)
-    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.LogNormal(2.0, 0.05)}, noise_sd=0.02, runs=6)
+    found = tq.calibrate(
+        DEPTH, data, neo_hooke, {"C10": tq.LogNormal(2.0, 0.05)}, discrepancy="none", noise_sd=0.02, runs=6
+    )
     assert any("lies beyond the runs of the model in C10 (lower)" in text for text in found.warnings)
     assert not any("bound of the prior" in text for text in found.warnings)
 
@@ -492,5 +513,7 @@ def test_an_emulator_of_narrower_priors_is_told_where_it_extrapolates():
     emulator = emulate(designed(neo_hooke, {"C10": tq.Uniform(0.2, 1.0)}, 8), DEPTH)
     for C10, is_told in ((2.5, True), (0.7, False)):
         data = measured(neo_hooke, {"C10": C10}, 0.02)
-        found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, noise_sd=0.02, emulator=emulator)
+        found = tq.calibrate(
+            DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, discrepancy="none", noise_sd=0.02, emulator=emulator
+        )
         assert any("lies beyond the runs of the model in C10 (upper)" in text for text in found.warnings) == is_told

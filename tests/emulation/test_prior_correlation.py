@@ -38,7 +38,7 @@ def test_where_the_data_say_nothing_the_posterior_is_the_prior(method):
     priors = {name: PRIORS[name] for name in ("mu", "alpha")}
     found = tq.calibrate(
         DEPTH, DEPTH, lambda p, x: p["mu"] * x - 0.01 * p["alpha"] * x**2, priors, noise_sd=1e3, runs=16, method=method,
-        correlations={("mu", "alpha"): CORRELATION},
+        discrepancy="none", correlations={("mu", "alpha"): CORRELATION},
     )  # fmt: skip
     draws = found.draws(4000)
     line = np.stack([np.log(draws[:, 0]), draws[:, 1]])

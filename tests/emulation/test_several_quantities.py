@@ -28,7 +28,7 @@ def measured(function, truth, seed=0):
 @pytest.mark.slow
 def test_two_quantities_give_the_closed_form_together():
     data = measured(linear, {"k": 1.7, "m": 1.3})
-    found = tq.calibrate(CONTROL, data, linear, PRIORS, noise_sd=NOISE, runs=10)
+    found = tq.calibrate(CONTROL, data, linear, PRIORS, discrepancy="none", noise_sd=NOISE, runs=10)
     columns = np.vstack([np.outer(CONTROL["force"], [1, 1]) / NOISE["force"],
                          np.outer(1e-6 * (1 + CONTROL["shift"]), [1, -1]) / NOISE["shift"]])  # fmt: skip
     standard = np.concatenate([data[name] / NOISE[name] for name in data])
@@ -94,7 +94,9 @@ def test_a_quantity_of_a_small_unit_is_emulated_as_well_as_the_other():
         k, m = parameters["k"], parameters["m"]
         return {"force": np.sin(k) * control["force"], "shift": 1e-6 * np.exp(-m * control["shift"])}
 
-    found = tq.calibrate(CONTROL, measured(curved, {"k": 1.2, "m": 1.5}), curved, PRIORS, noise_sd=NOISE, runs=24)
+    found = tq.calibrate(
+        CONTROL, measured(curved, {"k": 1.2, "m": 1.5}), curved, PRIORS, discrepancy="none", noise_sd=NOISE, runs=24
+    )
     points = np.random.default_rng(3).uniform(0.5, 3.0, (50, 2))
     mean, _ = found.emulator.moments(points)
     for number, (start, stop) in enumerate(found.problem.quantities.values()):

@@ -285,6 +285,7 @@ def calibrated(seed: int, rounding: float) -> Numbers:
         measured * (1 + rounding),
         indentation,
         {"mu": tq.Uniform(0.1, 1), "b": tq.Uniform(0.5, 3)},
+        discrepancy="none",
         noise_sd=0.01,
         runs=20,
         seed=seed,

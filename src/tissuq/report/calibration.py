@@ -92,7 +92,10 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     return Result(
         command=_repeated(settings.model_copy(update=relocated)),
         title=f"Forward model {model}: {names_of(study)}",
-        subject=f"{len(calibration.problem.measured)} measurements · {runs} runs · discrepancy {settings.discrepancy}",
+        subject=(
+            f"{len(calibration.problem.measured)} measurements · {runs} runs · discrepancy "
+            f"{calibration.problem.discrepancy.name}"
+        ),
         numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=remark)),
         finding=finding_of(study),
         uses=uses,
