@@ -246,8 +246,8 @@ def has_process(discrepancy: Discrepancy, quantity: str, symbols: Sequence[str])
 
 
 def is_far(control: FloatArray, zero_load: float) -> bool:
-    """Return whether a process that is pinned at zero load is as good as free at all controls (n,)."""
-    return bool(np.abs(control - zero_load).min() > np.ptp(control))
+    """Return whether a process that is pinned at zero load is as good as free at all controls (n,): one has none."""
+    return bool(np.abs(control - zero_load).min() > np.ptp(control) > 0)
 
 
 def _is_whole(prior: Prior) -> bool:
