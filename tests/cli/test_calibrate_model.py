@@ -32,7 +32,7 @@ def words(here):
     return [
         "calibrate", "punch.csv", "--model", "model.inp", "--replace", "TISSUE", "--material", "neo-hookean",
         "--range", "0.7:1.3", "--qoi", "force=RF2@TOP", "--solver", "ccx", "--command", command, "--unit", "kPa",
-        "--noise-sd", NOISE_SD, "--runs", 8, "--max-jobs", 1, "--no-figures", "--out", "out",
+        "--noise-sd", NOISE_SD, "--discrepancy", "none", "--runs", 8, "--max-jobs", 1, "--no-figures", "--out", "out",
     ]  # fmt: skip
 
 
@@ -293,8 +293,8 @@ def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
     said = run_in(
         tmp_path, "calibrate", "punch.csv", "--model", "model.inp", "--replace", "TISSUE", "--material", "neo-hookean",
         "--range", "0.7:1.3", "--qoi", "force=RF2@TOP", "--command", write_model(tmp_path), "--solver", "ccx",
-        "--unit", "kPa", "--prior-run", "fitted", "--noise-sd", noise_sd, "--runs", 8, "--max-jobs", 1, "--no-figures",
-        "--out", "out",
+        "--unit", "kPa", "--prior-run", "fitted", "--noise-sd", noise_sd, "--discrepancy", "none", "--runs", 8,
+        "--max-jobs", 1, "--no-figures", "--out", "out",
     )  # fmt: skip
     assert said.status == 0, said.err
     mean, sd = c10(tmp_path / "out")

@@ -249,7 +249,7 @@ outputs = [c * (1 + 0.1 * c) * column for c in points]
 results = [{"parameters": {"C10": c}, "outputs": y, "error": "", "seconds": 0} for c, y in zip(points, outputs)]
 emulator = emulate(gathered(["C10"], results, 5), column)
 measured = 1.2 * 1.12 * column + 1e-3
-problem = pose(column, measured, {"C10": tq.Uniform(0.5, 2)}, noise_sd=1e-3)
+problem = pose(column, measured, {"C10": tq.Uniform(0.5, 2)}, "none", noise_sd=1e-3)
 found = Likelihood(problem, emulator).log_density(at)[0]
 mean, cov = (each[0] for each in emulator.moments(at))
 apart, cov = measured - mean, cov + 1e-6 * np.eye(5)
