@@ -237,7 +237,7 @@ def test_a_spread_in_the_cell_of_a_mean_that_says_not_what_it_is_is_asked_about(
     rows = zip(STRETCH, STRESS, SPREAD, strict=True)
     lines = ["Stretch,Stress (kPa)", *(f"{stretch:.12g},{mean:.12g} ± {spread:.12g}" for stretch, mean, spread in rows)]
     (path := tmp_path / "test.csv").write_text("\n".join(lines), encoding="utf-8")
-    with pytest.warns(UserWarning, match="'sem=stress ± \\(kPa\\)'"):
+    with pytest.warns(UserWarning, match=r'columns=\{"sem": "stress ± \(kPa\)"\}'):
         data = read_experiment(path)
     np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-9, atol=1e-15)
     assert not data.standard_error.any()
