@@ -106,7 +106,7 @@ def test_a_class_that_lacks_what_lists_show_is_refused_by_what_it_lacks(package)
     members = {
         "__module__": package.__name__,
         "name": "leaning",
-        "principal_stretches": lambda self, point: (point,) * 3,
+        "principal_stretches": lambda self, point: (point, point**-0.25, point**-0.75),
     }
     package.leaning = type("Leaning", (tq.LoadingMode,), members)
     with pytest.raises(tq.ModelError, match=r"another_package:leaning.*the class has no description"):

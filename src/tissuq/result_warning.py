@@ -25,6 +25,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "not-converged": "Sampling has not converged.",
         "doubtful-reading": "The file states no unit, or a column was read whose name says something else.",
         "stress-at-rest": "There is stress at the reference state, which no elastic material has.",
+        "large-drift": "Back at the first stretch, the stress is another one by more than 15 % of the largest.",
         "tests-apart": "Several tests differ by more than tests of one tissue are assumed to.",
         "contradicting-tests": "Several tests contradict one material.",
         "unmodelled-curve": "The fitted curve does not follow the measured one.",

@@ -6,6 +6,7 @@ import re
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import gallery
@@ -14,6 +15,7 @@ from tissuq.assessment import answer
 from tissuq.assessment.answer import Answer, Estimate
 from tissuq.assessment.next_step import STEPS, Step, _with_options, next_step
 from tissuq.assessment.uses import PRECISE, Use, Verdict, _ends_in_words, precision_of, uses_of
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.result_warning import ResultWarning, Severity
@@ -173,6 +175,18 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     assert "stress at rest" in offset.uses[0].reason
     assert offset.uses[1].verdict is Verdict.CARE
     assert "--load-zero first" in offset.next_step.shell
+    drift = "the stress is 0 kPa at the beginning and 1 kPa at the end: to fit one branch give --branch loading."
+    drifted = posterior.answer_with([ResultWarning(drift, "large-drift")])
+    assert [use.verdict for use in drifted.uses[:2]] == [Verdict.NO, Verdict.CARE]
+    assert "the load drifts" in drifted.uses[0].reason
+    assert "the load drifts" in drifted.uses[1].reason
+    assert "--branch loading" in drifted.next_step.shell
+    way, further = np.linspace(0, 0.3, 20), 1.3
+    stacked = {"strain (%)": 100 * np.r_[way, way], "stress [kPa]": np.r_[way, further * way]}
+    cycles = next(w for w in data_warnings(tq.inspect(pd.DataFrame(stacked)).reading) if "cycles" in w)
+    assert "--cycle last" in cycles
+    assert "fit again" not in vague.answer_with([cycles]).next_step.shell  # they may be two specimens
+    assert "it says what to do" in vague.answer_with([cycles]).next_step.shell
     torn = ResultWarning("the stress falls while the test goes on: give --until-peak.")
     assert "warning about the measurements" in vague.answer_with([torn]).next_step.shell
     slack = ResultWarning("the first 25 rows carry no load: give --preload auto.", "slack")

@@ -51,3 +51,29 @@ def test_other_files_are_read_as_text(notebook, tmp_path):
     path = tmp_path / "test.csv"
     path.write_text("stretch,stress_kPa\n1.0,0.0\n1.1,2.5\n")
     assert len(tq.read_experiment(path)) == 2
+
+
+def failing(path):
+    raise ValueError("bad checksum")
+
+
+@pytest.mark.parametrize(
+    ("sheets", "words"),
+    [
+        (lambda path: ["1\t2"], "must return the lines of every sheet as texts, by its name"),
+        (lambda path: {"one": [b"1\t2"]}, "must return the lines of every sheet as texts, by its name"),
+        (failing, "cannot read it: ValueError: bad checksum"),
+    ],
+)
+def test_what_a_format_of_ones_own_does_wrong_is_said(sheets, words):
+    class Wrong(FileFormat):
+        """Its name is not kept."""
+
+        name = property(lambda self: "wrong")
+        signature = b"never"
+
+        def sheets(self, path):
+            return sheets(path)
+
+    with pytest.raises(tq.InputError, match=rf"^some\.file: the format 'wrong' \(.*Wrong\) {words}"):
+        Wrong().lines_by_sheet("some.file")

@@ -115,9 +115,12 @@ def test_a_column_that_only_its_unit_tells_is_named_first_with_how_to_say_anothe
     path = written(tmp_path, "Foo (%),Bar (kPa)", 100 * (L - 1), P)
     with pytest.warns(UserWarning, match="check the column") as warned:
         tq.read(path)
-    texts = [str(warning.message) for warning in warned]
-    columns = {role: name for text in texts for role, name in proposed(text.replace(";", " ")).items()}
-    assert columns == {"strain": "Foo (%)", "stress": "Bar (kPa)"}
+    columns = {"strain": "Foo (%)", "stress": "Bar (kPa)"}
+    for warning, (role, name) in zip(warned, columns.items(), strict=True):
+        assert f'{role}="{name}"' in str(warning.message)
+    assert [proposed(text.replace(";", " ")) for text in tq.inspect(path).warnings] == [
+        {role: name} for role, name in columns.items()
+    ]
     assert str(tq.inspect(path)).startswith("ATTENTION check the column: 'Foo (%)'")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import tissuq as tq
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.options import READING_OPTIONS, spelled_out
 from tissuq.experiments.reading.python_form import SWITCHES, in_python
 from tissuq.studies.answers import READING
@@ -47,6 +50,51 @@ def test_every_option_of_reading_is_an_argument_of_python(option):
     value = "" if option in SWITCHES else VALUES.get(option, "3")
     arguments = eval(f"dict({in_python(f'--{option} {value}'.strip())})")
     assert spelled_out(arguments, READING_OPTIONS)
+
+
+def test_lines_to_leave_out_stay_together():
+    text = in_python("to leave them out give --leave-out 11:71,81:141, or --cycle 2.")
+    assert text == 'to leave them out give leave_out="11:71,81:141", or cycle=2.'
+
+
+def test_a_tolerance_is_proposed_with_its_unit_and_is_taken_so():
+    text = in_python("give --tolerance zero=0.74, or --tolerance resolution=0.002.", "kPa")
+    assert text == 'give tolerances={"zero": "0.74 kPa"}, or tolerances={"resolution": 0.002}.'
+    assert tq.Tolerances(zero="0.74 kPa").sizes == {"zero": pytest.approx(0.74e-3)}
+    with pytest.raises(tq.InputError, match="is not a unit of stress"):
+        tq.Tolerances(zero="0.74 mm")
+    with pytest.raises(tq.InputError, match="has no unit"):
+        tq.Tolerances(zero="0.74")
+
+
+def there_and_back(drift):
+    course = np.r_[STRETCH, STRETCH[::-1]]
+    stress = 20 * (course - course**-2)
+    return {"stretch": course, "stress [kPa]": stress + drift * np.linspace(0, stress.max(), len(course))}
+
+
+@pytest.mark.parametrize("read", [tq.read, tq.read_tests, lambda data: tq.fit(data, discrepancy="none", noise_sd=1.0)])
+@pytest.mark.parametrize("is_file", [True, False])
+def test_python_warns_of_a_drift_when_it_reads(tmp_path, read, is_file):
+    data = pd.DataFrame(there_and_back(0.3))
+    if is_file:
+        data.to_csv(file := tmp_path / "test.csv", index=False)
+    with pytest.warns(UserWarning, match='the zero of the load cell drifts.* give branch="loading"'):
+        read(str(file) if is_file else data)
+
+
+@pytest.mark.parametrize(("drift", "code"), [(0.1, "measurements"), (0.2, "large-drift")])
+def test_a_drift_that_takes_the_modulus_out_of_its_interval_has_a_code_of_its_own(drift, code):
+    (warning, *_) = data_warnings(tq.inspect(pd.DataFrame(there_and_back(drift))).reading)
+    assert "the zero of the load cell drifts" in warning
+    assert warning.code == code
+
+
+def test_python_does_not_warn_of_a_plain_test_or_of_notes():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tq.read({"stretch": STRETCH[5:], "stress [kPa]": STRESS[5:]})
+        tq.read(pd.DataFrame(there_and_back(0.0)), branch="loading")
 
 
 def test_warnings_and_notes_in_python_propose_arguments():

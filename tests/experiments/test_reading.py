@@ -6,7 +6,7 @@ import pytest
 
 from marks import slow_but
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.reading.experiment_file import read_experiment
+from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 
 pytestmark = pytest.mark.filterwarnings("ignore:check the unit:UserWarning")  # many headings here state no unit
 
@@ -458,10 +458,10 @@ def test_many_rows_are_read_at_once_and_not_one_by_one(tmp_path):
         before = sys.getprofile()
         sys.setprofile(counted)
         try:
-            data = read_experiment(path)
+            reading = read_file(path)  # what is strange about it is looked for in every cycle, whatever its rows
         finally:
             sys.setprofile(before)
-        assert len(data) == 1000 * thousands
+        assert len(reading.experiment) == 1000 * thousands
         calls.append(count)
     assert calls[1] - calls[0] < 2 * 90_000
 
@@ -491,7 +491,7 @@ def test_an_amount_of_shear_under_the_name_of_a_stretch_is_read_and_told(tmp_pat
         data = read_experiment(file, mode="simple-shear")
     assert data.stretch.tolist() == [0.0, 0.1, 0.5, 1.2]
     name = header.split(",")[0]
-    assert f"--column shear='{name}'" in str(told[0].message)
+    assert f'shear="{name}"' in str(told[0].message)
     said = read_experiment(file, mode="simple-shear", columns={"shear": name})
     assert said.stretch.tolist() == data.stretch.tolist()
 

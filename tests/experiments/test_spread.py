@@ -108,6 +108,46 @@ def test_a_spread_that_cannot_be_used_is_said_and_the_file_is_read_all_the_same(
     assert not inspection.reading.experiment.standard_error.any()
 
 
+@pytest.mark.parametrize(
+    ("upper", "lower", "half"),
+    [
+        ("Upper", "Lower", "half of 'Upper' - 'Lower'"),
+        ("Mean + SD (kPa)", "Mean - SD (kPa)", "half of 'Mean + SD (kPa)' - 'Mean - SD (kPa)'"),
+        ("+SEM", "-SEM", "half of '+SEM' - '-SEM'"),
+        ("Upper error", "Lower error", "the mean of 'Upper error' and 'Lower error'"),
+    ],
+)
+@pytest.mark.parametrize("name", ["Stress (kPa)", "Mean stress (kPa)"])
+def test_ends_of_error_bars_are_no_standard_deviations_and_are_said(tmp_path, upper, lower, half, name):
+    above, below = (SPREAD, SPREAD) if "error" in upper else (STRESS + SPREAD, STRESS - SPREAD)
+    file = written(tmp_path, **{"Stretch": STRETCH, name: STRESS, upper: above, lower: below, "n": STRETCH * 0 + 8})
+    inspection = tq.inspect(file)
+    assert any("error bars of the stress" in text and half in text for text in inspection.warnings)
+    assert not inspection.reading.experiment.standard_error.any()
+
+
+def test_beside_ends_of_error_bars_a_standard_error_is_read(tmp_path):
+    columns = {"Stretch": STRETCH, "Stress (kPa)": STRESS, "max": STRESS + SPREAD, "min": STRESS - SPREAD}
+    data = read_experiment(written(tmp_path, **columns, SEM=SPREAD))
+    np.testing.assert_allclose(data.standard_error, SPREAD * 1e-3, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "words"),
+    [
+        ("# n = 8", "SD", "--mean-of 8, if that is what line 1 means by 'n = 8'"),
+        ("mean of 12 specimens", "SD", "--mean-of 12, if that is what line 1 means by 'mean of 12'"),
+        ("porcine brain", "SD (n=7)", "--mean-of 7, if that is what line 2 means by 'n=7'"),
+        ("# n = 8", "±", "--mean-of 8, if that is what line 1 means by 'n = 8'"),
+        ("Speed n = 0.5 mm/s", "SD", "--mean-of 6)"),
+    ],
+)
+def test_a_number_of_specimens_that_the_file_states_is_proposed(tmp_path, line, name, words):
+    file = written(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, name: SPREAD})
+    file.write_text(f"{line}\n{file.read_text()}")
+    assert any(words in text for text in tq.inspect(file).warnings)
+
+
 def test_a_cell_that_is_no_number_leaves_the_column_out_with_a_note(tmp_path):
     file = tmp_path / "test.csv"
     file.write_text("Strain,Stress (kPa),SEM (kPa)\n0,0,-\n0.1,2,0.3\n0.2,5,0.5\n")
@@ -197,7 +237,7 @@ def test_a_spread_in_the_cell_of_a_mean_that_says_not_what_it_is_is_asked_about(
     rows = zip(STRETCH, STRESS, SPREAD, strict=True)
     lines = ["Stretch,Stress (kPa)", *(f"{stretch:.12g},{mean:.12g} ± {spread:.12g}" for stretch, mean, spread in rows)]
     (path := tmp_path / "test.csv").write_text("\n".join(lines), encoding="utf-8")
-    with pytest.warns(UserWarning, match="'sem=stress ± \\(kPa\\)'"):
+    with pytest.warns(UserWarning, match=r'columns=\{"sem": "stress ± \(kPa\)"\}'):
         data = read_experiment(path)
     np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-9, atol=1e-15)
     assert not data.standard_error.any()

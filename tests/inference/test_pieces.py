@@ -234,3 +234,12 @@ def test_cubics_of_given_slopes_are_scipys():
     ours, scipys = HermiteCubics(points, values, slopes), CubicHermiteSpline(points, values, slopes)
     np.testing.assert_allclose(ours(at), scipys(at), rtol=0, atol=1e-14)
     np.testing.assert_allclose(ours.integral(at), scipys.antiderivative()(at), rtol=0, atol=1e-13)
+
+
+def test_a_marginal_says_in_a_line_what_it_is():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+    marginal = tq.fit(data, discrepancy="none", noise_sd=0.02).marginals["C10"]
+    low, high = marginal.hdi()
+    assert repr(marginal) == (
+        f"<Marginal: mean {marginal.mean:.4g}, sd {marginal.sd:.2g}, 95 % interval {low:.4g} to {high:.4g}>"
+    )

@@ -24,6 +24,22 @@ class Drift(MeasurementError):
         return np.linspace(0.0, 1.0, len(points.stretch)) * np.ones_like(points.stress)
 
 
+class Misshapen(MeasurementError):
+    """An error whose effect does not have the shape of the stresses."""
+
+    name = "misshapen"
+    description = "of no shape"
+
+    def effect(self, points):
+        return np.ones(3)
+
+
+def test_an_effect_of_another_shape_is_refused():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
+    with pytest.raises(tq.ModelError, match=r"'misshapen' has an effect of shape \(3,\) on 15 stresses"):
+        tq.fit(data, discrepancy="none", noise_sd=0.002, tolerances=Tolerances(misshapen=0.2))
+
+
 @pytest.mark.parametrize(
     ("mode", "stretch"), [(Uniaxial(), 1 + 1e-3 * np.arange(4)), (SimpleShear(), 0.1 * np.arange(4))]
 )

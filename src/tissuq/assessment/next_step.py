@@ -92,6 +92,7 @@ STEPS_OF_WARNINGS: Mapping[str, str] = {
     "contradicting-tests": "apart",
     "unmodelled-curve": "curve",
     "measurements": "measurements",
+    "large-drift": "measurements",
     "unstable": "stable",
     "few-measurements": "few",
     "slack": "slack",
@@ -106,6 +107,8 @@ OPTION = (
 )
 OPTIONS = re.compile(f"(?:{OPTION})(?: (?:{OPTION}))*")
 """The options, with their values, that a warning about measurements proposes."""
+MAY_BE_SPECIMENS = "they may be tests of several specimens"
+"""What a warning about cycles says of those whose unloading was not recorded."""
 
 
 def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
@@ -145,10 +148,13 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
 def _with_options(step: Step, warning: ResultWarning, others: Sequence[ResultWarning] = ()) -> Step:
     """Return a step with the options that a warning proposes first, or without a command where it proposes none.
 
-    Where another one proposes these and more, it has all of that.
+    Where another one proposes these and more, it has all of that. Where cycles may be specimens, only a person knows
+    which of two things to do.
     """
     if "{options}" not in step.shell:
         return step
+    if MAY_BE_SPECIMENS in warning:
+        return step._replace(shell=step.python)
     proposed, *further = (OPTIONS.search(each.shell) for each in (warning, *others))
     if not proposed:
         return step._replace(shell=step.python)

@@ -95,6 +95,7 @@ def _reporting(
         "sampling has not converged": "not-converged" in codes,
         "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
         "there is stress at rest, so that it may be off by far more than its interval": "stress-at-rest" in codes,
+        "the load drifts during the test, so that it may be off by far more than its interval": "large-drift" in codes,
         "a bound of its prior, not the data, determines it": is_cut,
         "the tests contradict each other, so that it may be that of none of them": "tests-apart" in codes,
         "the fitted curve departs from the measured one, and the interval does not include that": (
@@ -186,6 +187,7 @@ def _own_tests(solution: Solution, codes: Collection[str], counts: str, missed: 
     sentence = f"stress {of_what}{width}{where}{worst_test}; {counts}"
     for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
                          ("stress-at-rest", "there is stress at rest, where the material has none"),
+                         ("large-drift", "the load drifts during the test"),
                          ("tests-apart", "the tests contradict each other"),
                          ("contradicting-tests", "the tests contradict each other"),
                          (CORRELATED, CORRELATED_ERRORS),

@@ -244,7 +244,7 @@ class DeckForward(Forward):
         in_mpa = {p.symbol: parameters[p.symbol] / (self.cards.factor if p.unit else 1.0) for p in law.parameters}
         drawn = card_material(law, tuple(in_mpa.values()), self.stretch, self.mode)
         settings = replace(self.cards, number=int(number) if number.isdecimal() else 1)
-        cards = self._code.cards(drawn, settings)
+        cards = self._code.checked_cards(drawn, settings)
         if not cards.blocks:
             raise UnreadableError(f"cards of the format '{self._code.name}' do not go into a deck.")
         return cards

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from tissuq.arrays import FloatArray
-from tissuq.errors import InputError
+from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.units import stress_unit
 from tissuq.export.states import SeenStates
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
@@ -170,6 +170,30 @@ class CardFormat(ABC):
     @abstractmethod
     def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
         """Return the draws as files."""
+
+    def checked_cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
+        """Return `cards`; whatever else a format of another package raises or returns is an error in words.
+
+        Raises
+        ------
+        TissuqError
+            As `cards` does, and when it fails or does not return files with a row of the index for every draw.
+        """
+        format_name = f"the format of cards '{self.name}' ({type(self).__module__}.{type(self).__qualname__})"
+        try:
+            cards = self.cards(ensemble, settings)
+        except TissuqError:
+            raise
+        except Exception as error:  # of code that is not from here
+            raise InputError(f"{format_name} cannot write the draws: {type(error).__name__}: {error}.") from error
+        if not isinstance(cards, Cards):
+            raise InputError(f"{format_name} must return tissuq.export.cards.Cards, not {type(cards).__name__}.")
+        if len(cards.index) != len(ensemble):
+            raise InputError(
+                f"{format_name} returns {len(cards.index)} rows of the index for {len(ensemble)} draws: return one for "
+                "each."
+            )
+        return cards
 
 
 def card_formats() -> dict[str, type[CardFormat]]:

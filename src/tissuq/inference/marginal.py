@@ -46,6 +46,10 @@ class Marginal:
     density: FloatArray
     cumulative: FloatArray
 
+    def __repr__(self) -> str:
+        low, high = self.hdi()
+        return f"<Marginal: mean {self.mean:.4g}, sd {self.sd:.2g}, 95 % interval {low:.4g} to {high:.4g}>"
+
     @classmethod
     def of(cls, mean: float, sd: float, points: FloatArray, density: FloatArray, cumulative: FloatArray) -> Marginal:
         """Return a marginal whose density is not negative and whose cumulative probabilities rise to one."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.arrays import FloatArray, IndexArray
-from tissuq.errors import InputError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
@@ -389,6 +389,12 @@ class StatisticalModel(ErrorModel):
 
 def _basis(material: Material, discrepancy: Discrepancy, states: States, bent: ArrayLike) -> FloatArray:
     of_material, of_discrepancy = stress_basis(material, states, bent), discrepancy.mean_basis(states)
+    count = sum(parameter.is_linear for parameter in discrepancy.parameters)
+    if of_discrepancy.ndim < 2 or of_discrepancy.shape[-1] != count:
+        raise ModelError(
+            f"discrepancy '{discrepancy.name}': mean_basis has the shape {of_discrepancy.shape}, not a column for each "
+            f"of its linear parameters ({count})."
+        )
     shape = (*of_material.shape[:-1], of_discrepancy.shape[-1])
     return np.concatenate([of_material, np.broadcast_to(of_discrepancy, shape)], axis=-1)
 

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tissuq.arrays import BoolArray, FloatArray
-from tissuq.errors import InputError
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.checked_arrays import stress_in_mpa
 from tissuq.experiments.experiment import Experiment
 from tissuq.model.measurement_errors import (
     ErrorPoints,
@@ -96,7 +97,7 @@ class Tolerances:
         Relative, of strain: gauge length.
     slack : float
         Of the stretch at which the specimen is free of stress: slack, preload.
-    zero : float, MPa
+    zero : float, MPa, or str such as "0.7 kPa"
         Of the stress at rest: zero of the load cell.
     smooth : float
         Relative, of the stress, another one all along the curve of each test: digitising, averaging, drift, hysteresis.
@@ -124,10 +125,11 @@ class Tolerances:
     0.01
     """
 
-    def __init__(self, estimand: str = "", /, **sizes: float) -> None:
+    def __init__(self, estimand: str = "", /, **sizes: float | str) -> None:
         if estimand and estimand not in ESTIMANDS:
             raise InputError(f"there is no estimand '{estimand}'. Choose one of: {', '.join(ESTIMANDS)}.")
         errors = {name: find(MeasurementError, "error of a test", name, InputError)() for name in sizes}
+        sizes = {name: stress_in_mpa(size) if errors[name].is_stress else size for name, size in sizes.items()}
         for name, size in sizes.items():
             if not isinstance(size, Real) or isinstance(size, bool) or not 0 <= float(size) < inf:
                 raise InputError(f"the tolerance of the {name} must be a number, zero or more, not {size!r}.")
@@ -196,13 +198,13 @@ class Tolerances:
         """The standard deviation of every single stress, over the largest one of its test."""
         return self._sizes.get(ResolutionError.name, 0.0)
 
-    def with_sizes(self, **sizes: float) -> Tolerances:
+    def with_sizes(self, **sizes: float | str) -> Tolerances:
         """Return the same tolerances but for these sizes, which do not count as stated by themselves."""
-        changed = Tolerances("" if self.estimand == AS_TESTED else self.estimand, **(self._stated | sizes))
+        changed = Tolerances("" if self.estimand == AS_TESTED else self.estimand, **{**self._stated, **sizes})
         changed._numbers = self._numbers
         return changed
 
-    def replaced_by(self, sizes: Mapping[str, float]) -> Tolerances:
+    def replaced_by(self, sizes: Mapping[str, float | str]) -> Tolerances:
         """Return the same tolerances but for sizes that are stated as numbers.
 
         Examples
@@ -300,9 +302,20 @@ class Tolerances:
             Which errors: those with this value of `MeasurementError.shared`.
         """
         columns = [
-            size * error.effect(points) for error, size in self if not error.is_independent and error.shared == shared
+            size * _effect(error, points) for error, size in self if not error.is_independent and error.shared == shared
         ]
         return np.column_stack([np.zeros((len(points.stress), 0)), *columns])
+
+
+def _effect(error: MeasurementError, points: ErrorPoints) -> FloatArray:
+    """Return what a unit of an error adds to the stresses of a test: (n,), or (n, q)."""
+    effect, count = np.asarray(error.effect(points)), len(points.stress)
+    if effect.shape[:1] != (count,):
+        raise ModelError(
+            f"the error of a test '{error.name}' has an effect of shape {effect.shape} on {count} stresses: return a "
+            "number for each of them."
+        )
+    return effect
 
 
 BETWEEN_SPECIMENS = Tolerances(stress=ESTIMANDS[TISSUE].sizes["stress"])

@@ -46,7 +46,7 @@ def fit_population(
     noise_sd: float | str | Mapping[str, float | str | Sequence[float]] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    tolerances: Tolerances | Mapping[str, float] | str | None = None,
+    tolerances: Tolerances | Mapping[str, float | str] | str | None = None,
     method: Method = "auto",
     seed: int = 0,
 ) -> Population:

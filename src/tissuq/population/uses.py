@@ -147,7 +147,8 @@ def _beside_measurements(
             worst_of(verdict, Verdict.CARE),
             f"{sentence}; there is stress at rest in {', '.join(at_rest)}",
         )
-    if any(has_code([w], "measurements") and getattr(w, "severity", None) is not Severity.NOTE for w in warnings):
+    about_measurements = [w for w in warnings if has_code([w], "measurements") or has_code([w], "large-drift")]
+    if any(getattr(w, "severity", None) is not Severity.NOTE for w in about_measurements):
         return worst_of(verdict, Verdict.CARE), f"{sentence}; see the warning about the measurements"
     return verdict, sentence
 

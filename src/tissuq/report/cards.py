@@ -62,7 +62,7 @@ def write_cards(
     *HYPERELASTIC, YEOH
     """
     with run_folder(Path(folder), "export", force=force) as scratch:
-        cards = card_format(format).cards(ensemble, CardSettings(**settings))
+        cards = card_format(format).checked_cards(ensemble, CardSettings(**settings))
         pairs = zip(cards.index, distances_from_median(ensemble).tolist(), strict=True)
         cards = replace(cards, index=tuple({**row, "from_median": distance} for row, distance in pairs))
         for name, text in cards.files.items():

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SOURCE = "source"
 """The folder with the copies."""
 SPOILING = ("not-converged", "doubtful-reading", "stress-at-rest", "tests-apart", "contradicting-tests",
-            "unmodelled-curve", "measurements")  # fmt: skip
+            "unmodelled-curve", "large-drift", "measurements")  # fmt: skip
 """Codes of warnings about what a fit says of the tissue, and not about how exactly."""
 SIMULATING, USE_OF_FIT = ("simulate with finite elements", COMPUTING), "use of the fit in finite elements"
 LAW_OF_USE = ", with "

@@ -167,12 +167,12 @@ def prepare_ensemble(
         step(f"cards of {name}")
         number = replaced[name].number
         card_settings = settings.card_settings(number=int(number) if number.isdecimal() else 1)
-        cards[COMPLETE][name] = formatting.cards(ensemble, card_settings)
+        cards[COMPLETE][name] = formatting.checked_cards(ensemble, card_settings)
         if not cards[COMPLETE][name].blocks:
             raise InputError(f"cards of the format '{settings.card_format}' do not go into a deck.")
         check_fibres(replaced[name].name, cards[COMPLETE][name])
         if is_shared:
-            cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
+            cards[MATERIAL_ONLY][name] = formatting.checked_cards(ensemble.alone, card_settings)
     _check_names(quantities, ensembles)
     _check_functions(quantities)
     check_sets(deck, quantities, solver)

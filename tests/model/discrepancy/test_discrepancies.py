@@ -125,3 +125,21 @@ def test_the_yeoh_terms_carry_no_initial_stiffness_and_the_mooney_rivlin_term_do
     }
     np.testing.assert_allclose(slopes["yeoh"], 0, atol=1e-8)
     np.testing.assert_allclose(slopes["mooney-rivlin"], 6, rtol=1e-8)
+
+
+class Bump(tq.Discrepancy):
+    """A bump (x - 1)^2, whose basis has no columns; its name is not kept."""
+
+    name = property(lambda self: "bump")
+    formula = "b (x - 1)^2"
+    source = "a test"
+    parameters = (tq.Parameter("b", "size of the bump"),)
+
+    def mean_basis(self, states):
+        return (np.asarray(states.abscissa) - 1) ** 2
+
+
+def test_a_basis_without_a_column_for_each_linear_parameter_is_refused():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.01, seed=1)
+    with pytest.raises(tq.ModelError, match=r"'bump': mean_basis has the shape \(16,\), not a column for"):
+        tq.fit(data, discrepancy=Bump(), noise_sd=0.01)

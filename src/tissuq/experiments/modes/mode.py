@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
@@ -40,6 +41,10 @@ class Control:
 
 STRETCH = Control("stretch")
 SHEAR = Control("amount of shear", reference=0.0, above=-inf)
+SMALL_CHANGES = np.array([0.0, 0.05, 0.1])
+"""Of the first control from rest, at which a mode that is not from here is looked at."""
+NO_CHANGE = 1e-9
+"""Largest difference of a stretch, or a volume, from 1 that is a rounding error."""
 HELD = 0.1
 """Step of a control from one measurement to the next, over those of another one, below which it is held."""
 
@@ -57,7 +62,8 @@ class LoadingMode(ABC):
     stress is then the derivative of the strain energy by its control. A mode whose principal axes are not those of the
     test overrides `deformation`, too, as does one whose deformation only an isotropic material has. One with other
     controls or with several stresses names them; where a stress is not the derivative by the control, or several axes
-    carry it, the mode overrides `paths`.
+    carry it, the mode overrides `paths`. What is not from here is checked when it is used: three stretches, 1 at rest,
+    of product 1.
     """
 
     entry_point_group: ClassVar[str] = "tissuq.modes"
@@ -79,6 +85,33 @@ class LoadingMode(ABC):
     def deformation(self, point: Any) -> Deformation:
         """Return the deformation at a point."""
         return Deformation.along_axes(self.principal_stretches(point))
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with its deformations, in words; nothing where they are isochoric and begin from the identity.
+
+        Examples
+        --------
+        >>> loading_mode("planar").problem
+        ''
+        """
+        try:
+            deformations = [path.moved(self.excursion(SMALL_CHANGES), 0.0) for path in self.paths]
+        except Exception as error:  # of code that is not from here
+            return f"its deformation cannot be computed ({type(error).__name__}: {error})"
+        if len(deformations) != len(self.stresses):
+            return f"it names {len(self.stresses)} stresses and has {len(deformations)} paths"
+        for deformation in deformations:
+            stretches = np.broadcast_arrays(*deformation.stretches, SMALL_CHANGES)[:-1]
+            if len(stretches) != 3:
+                return f"it has {len(stretches)} principal stretches, not three"
+            if not np.allclose([stretch[0] for stretch in stretches], 1.0, atol=NO_CHANGE):
+                return f"its principal stretches where nothing is deformed are {_numbers(stretches, 0)}, not 1"
+            volume = stretches[0] * stretches[1] * stretches[2]
+            if not np.allclose(volume, 1.0, atol=NO_CHANGE):
+                found = f"are {_numbers(stretches, -1)}, of product {volume[-1]:.4g}"
+                return f"it changes the volume: principal stretches a little from rest {found}, not 1"
+        return ""
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -202,9 +235,29 @@ class AlongAxis2(LoadingMode):
         return Deformation((stretch_2, stretch_1, stretch_3), (c22, c11, c12))
 
 
+def _numbers(stretches: Sequence[FloatArray], place: int) -> str:
+    return ", ".join(f"{stretch[place]:.4g}" for stretch in stretches)
+
+
+def _checked(mode: LoadingMode) -> LoadingMode:
+    """Return a mode, or raise where it is not from here and its deformations are wrong."""
+    kind = type(mode)
+    if not kind.__module__.startswith("tissuq.") and (problem := mode.problem):
+        raise ModelError(
+            f"loading mode '{mode.name}' ({kind.__module__}.{kind.__qualname__}) cannot be used: {problem}."
+        )
+    return mode
+
+
 def loading_modes() -> dict[str, type[LoadingMode]]:
-    """Return every loading mode by name."""
-    return variants(LoadingMode)
+    """Return every loading mode by name.
+
+    Raises
+    ------
+    ModelError
+        When the deformations of one of another package, or of your own, do not keep the volume or begin elsewhere.
+    """
+    return {name: type(_checked(kind())) for name, kind in variants(LoadingMode).items()}
 
 
 def curve_modes() -> list[LoadingMode]:
@@ -220,10 +273,10 @@ def loading_mode(mode: str | LoadingMode) -> LoadingMode:
     Raises
     ------
     ModelError
-        When no mode has that name.
+        When no mode has that name, or its deformations do not keep the volume or begin elsewhere.
     """
     if isinstance(mode, LoadingMode):
-        return mode
+        return _checked(mode)
     name, _, axis = str(mode).partition("@")
     along_axis_1 = _mode_named(name)
     if not axis:
@@ -239,7 +292,7 @@ def loading_mode(mode: str | LoadingMode) -> LoadingMode:
 
 def _mode_named(mode: str) -> LoadingMode:
     try:
-        return find(LoadingMode, "loading mode", mode, ModelError)()
+        return _checked(find(LoadingMode, "loading mode", mode, ModelError)())
     except ModelError as error:
         word = mode.strip().lower().replace("_", "-").replace(" ", "-")
         if word not in WORDS_FOR_MODES:

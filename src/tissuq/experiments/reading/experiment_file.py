@@ -27,10 +27,11 @@ from tissuq.experiments.reading.conversion import (
     with_engineering_stress,
 )
 from tissuq.experiments.reading.data_frame import is_data_frame
+from tissuq.experiments.reading.findings import cautions
 from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
-from tissuq.experiments.reading.python_form import refusals_worded_for, wording_for
+from tissuq.experiments.reading.python_form import in_python, refusals_worded_for
 from tissuq.experiments.reading.recognition import ColumnChoice, adding
 from tissuq.experiments.reading.regions import (
     AUTO,
@@ -110,7 +111,7 @@ class Reading:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What `read` warns of: doubts, and what was left out."""
+        """Doubts, and what was left out."""
         return *self.doubts, *self.warnings
 
     @property
@@ -244,8 +245,9 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     Warns
     -----
     UserWarning
-        Of a unit or a zero of displacements that was assumed, of dimensions that the file states otherwise, and of rows
-        and columns that cannot be used and are left out.
+        Of a unit or a zero of displacements that was assumed, of dimensions that the file states otherwise, of rows
+        and columns that cannot be used and are left out, and of what no elastic material does in a test, such as cycles
+        that differ, a drift of the load cell, relaxation or a rupture.
 
     Raises
     ------
@@ -266,8 +268,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     """
     with refusals_worded_for(path):
         reading = read_file(path, **options)
-    for text in reading.notes:
-        warnings.warn(wording_for(path)(text), stacklevel=2)
+    for text in cautions(reading):
+        warnings.warn(in_python(text, reading.experiment.stress_unit), stacklevel=2)
     return reading.experiment
 
 

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import date, time
+from itertools import chain
 from typing import Any, ClassVar
 
 from tissuq.errors import InputError
@@ -44,6 +45,25 @@ class FileFormat(ABC):
         InputError
             When the file cannot be opened, or a library that reads it is not installed.
         """
+
+    def lines_by_sheet(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
+        """Return `sheets`; whatever else a format of another package raises or returns is an error in words.
+
+        Raises
+        ------
+        InputError
+            As `sheets` does, and when it fails or does not return lines of text by sheet.
+        """
+        format_name = f"the format '{self.name}' ({type(self).__module__}.{type(self).__qualname__})"
+        try:
+            sheets = self.sheets(path)
+        except InputError:
+            raise
+        except Exception as error:  # of code that is not from here
+            raise InputError(f"{path}: {format_name} cannot read it: {type(error).__name__}: {error}.") from error
+        if not isinstance(sheets, dict) or not all(isinstance(line, str) for line in chain(*sheets.values())):
+            raise InputError(f"{path}: {format_name} must return the lines of every sheet as texts, by its name.")
+        return sheets
 
 
 def file_format(path: str | os.PathLike[str]) -> FileFormat | None:

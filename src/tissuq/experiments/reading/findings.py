@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -15,7 +16,6 @@ from tissuq.experiments.modes import Biaxial, Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.axial_stretch import note_of_stretched_tube
 from tissuq.experiments.reading.disturbances import scatter_of_neighbours
-from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import Cycle, labelled
 from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
@@ -26,6 +26,9 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
+
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.experiment_file import Reading
 
 MIN_ROWS_PER_CYCLE = 10
 """Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
@@ -73,13 +76,20 @@ def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
     labels = reading.used.labels
     warnings = [ResultWarning(text, *DOUBTFUL if is_doubtful(text) else CAUTION) for text in reading.notes]
     for kind in dict.fromkeys(region.kind for regions in reading.regions for region in regions):
-        of_kind = ([region.text for region in regions if region.kind == kind] for regions in reading.regions)
-        texts = labelled(labels, [" ".join(sentences) for sentences in of_kind])
-        warnings += [ResultWarning(text, *REGION_CODES.get(kind, CAUTION)) for text in texts if text]
+        of_kind = [[region for region in regions if region.kind == kind] for regions in reading.regions]
+        texts = labelled(labels, [" ".join(region.text for region in regions) for regions in of_kind])
+        code, severity = REGION_CODES.get(kind, CAUTION)
+        codes = [next((region.code for region in regions if region.code), code) for regions in of_kind]
+        warnings += [ResultWarning(text, code, severity) for text, code in zip(texts, codes, strict=True) if text]
     for check, code_and_severity in CHECKS.items():
         texts = labelled(labels, [check(reading, number) for number in range(len(labels))])
         warnings += [ResultWarning(text, *code_and_severity) for text in texts if text]
     return tuple(warnings)
+
+
+def cautions(reading: Reading) -> list[str]:
+    """Return those of `data_warnings` that matter for the numbers, of which Python warns when it reads."""
+    return [warning for warning in data_warnings(reading) if warning.severity is not Severity.NOTE]
 
 
 def _size(reading: Reading, number: int) -> str:

@@ -198,7 +198,8 @@ def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
     stretch = column 'stretch'
     """
     with refusals_worded_for(path):
-        return Inspection.of(read_file(path, **options), wording_for(path))
+        reading = read_file(path, **options)
+        return Inspection.of(reading, wording_for(path, reading.experiment.stress_unit))
 
 
 def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from json import dumps
 from typing import Any
 
@@ -22,12 +23,16 @@ SWITCHES = {
 """Options without a value."""
 NUMBERS = ("every", "table", "mean-of", "cycle", "axial-stretch", "skip-rows", "sheet")
 """Options whose values are numbers in Python, where they are numbers."""
+STRESS_AT_REST = "zero"
+"""The error of a test, of those that messages propose, whose size is a stress."""
 OTHER_NAMES = {"stretch": "stretch_range"}
 """Arguments that are not called as their options are."""
 WORDS = frozenset(["or", "and", "for", "to", "with", "of", "as", "in", "where", "if", "once", "out", "instead", "is"])
 """What may follow an option in a sentence, and is no value."""
 COMMAND = r"(?P<command>tissuq [a-z]+(?: (?:[A-Z][\w.#*]*|'[^']*'|--[a-z-]+(?: (?:'[^']*'|\"[^\"]*\"))?))+)"
-OPTION = r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+)))?"""
+OPTION = (
+    r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+(?:,\d[\d:]*)*)))?"""
+)
 EITHER = re.compile(f"{COMMAND}|{OPTION}")
 BESIDE = re.compile(r"(; in Python [^()]*(?=\)))|( \(in Python [^();]*(?:; (?P<rest>[^()]*))?\))")
 """The Python form that some messages have beside that of the shell."""
@@ -36,8 +41,10 @@ AGAIN = re.compile(rf"\b(?P<name>\w+)(?P<value>{VALUE})? \((?P=name)(?P<again>{V
 """An argument that is said twice, as in ``area (area="10 mm2")``."""
 
 
-def in_python(text: str) -> str:
+def in_python(text: str, stress_unit: str = "MPa") -> str:
     """Return a message with what it proposes as arguments of `tissuq.read` and its like; commands stay as they are.
+
+    What is a stress without a unit in the message is in ``stress_unit``.
 
     Examples
     --------
@@ -45,13 +52,17 @@ def in_python(text: str) -> str:
     'say which it is: stress="NAME" (or force=), with leave_out="40:59".'
     >>> in_python('give the cross-section: area (--area "10 mm2"), or --width "5 mm" --thickness "2 mm".')
     'give the cross-section: area="10 mm2", or width="5 mm", thickness="2 mm".'
+    >>> in_python("for a zero that is not sure give --tolerance zero=0.7.", "kPa")
+    'for a zero that is not sure give tolerances={"zero": "0.7 kPa"}.'
     """
     text = BESIDE.sub(lambda match: f" ({match['rest']})" if match["rest"] else "", text)
     pieces, end, is_argument = list[str](), 0, False
     for match in EITHER.finditer(text):
         between = text[end : match.start()]
         is_next = is_argument and between == " "
-        written, is_argument = (match[0], False) if match["command"] else _argument(match["name"], match["value"] or "")
+        written, is_argument = (
+            (match[0], False) if match["command"] else _argument(match["name"], match["value"] or "", stress_unit)
+        )
         pieces += [", " if is_next and match["name"] else between, written]
         end = match.end()
     return AGAIN.sub(
@@ -59,7 +70,7 @@ def in_python(text: str) -> str:
     )
 
 
-def _argument(option: str, typed: str) -> tuple[str, bool]:
+def _argument(option: str, typed: str, stress_unit: str) -> tuple[str, bool]:
     """Return an option as an argument, and whether it has a value."""
     value = typed.rstrip(".:")
     rest = typed[len(value) :]
@@ -79,15 +90,19 @@ def _argument(option: str, typed: str) -> tuple[str, bool]:
                 True,
             )
         return f"{role}={shown}{rest}", True
+    if option == "tolerance" and "=" in quoted:
+        error, _, size = quoted.partition("=")
+        shown = dumps(f"{size} {stress_unit}") if error == STRESS_AT_REST else size
+        return f"tolerances={{{dumps(error)}: {shown}}}{rest}", True
     if option == "stretch":
         return f"{name}=({', '.join(quoted.split(':'))}){rest}", True
     is_number = option in NUMBERS and re.fullmatch(r"[\d.]+", quoted)
     return f"{name}={quoted if is_number else dumps(quoted, ensure_ascii=False)}{rest}", True
 
 
-def wording_for(data: Any) -> Callable[[str], str]:
+def wording_for(data: Any, stress_unit: str = "MPa") -> Callable[[str], str]:
     """Return how messages about measurements are worded: those about tables in memory propose arguments alone."""
-    return in_python if is_data_frame(data) else str
+    return partial(in_python, stress_unit=stress_unit) if is_data_frame(data) else str
 
 
 @contextmanager

@@ -30,6 +30,9 @@ from tissuq.experiments.units import StressUnit
 AUTO = "auto"
 """What is given for a preload where load begins."""
 UNTIL_PEAK = "to leave out what follows the largest stress give --until-peak."
+LARGE_DRIFT = 0.15
+"""Share of the largest stress by which a drift takes the modulus out of its interval: with 0.1 it is in it, with 0.2
+not."""
 COARSE_STEP = 0.007
 """Share of the largest load from which its step is worth a word: its error is then that of a careful laboratory."""
 FEWEST_COPIED_ROWS = 5
@@ -42,11 +45,15 @@ FEWEST_RELAXED = 3
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Rows of a test, of those that are used, in which something happened; what, and a sentence with what to do."""
+    """Rows of a test, of those that are used, in which something happened; what, and a sentence with what to do.
+
+    ``code`` is that of the warning, where it is not that of the kind.
+    """
 
     kind: str
     rows: IndexArray
     text: str
+    code: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,15 +293,17 @@ def _drift(tested: TestedStress) -> Iterator[Region]:
         return
     course, stress = tested.course, tested.stress
     if drift := find_drift(course, stress):
+        share = abs(drift[1] - drift[0]) / np.abs(stress).max()
         begin, end = (f"{value / tested.unit.to_mpa:.3g}" for value in drift)
         yield Region(
             "drift",
             np.array([0, len(stress) - 1]),
             f"the stress is {begin} {tested.unit.name} at the beginning and {end} {tested.unit.name} at the end, back "
-            f"at {tested.control.name} {course[-1]:.4g}, {100 * abs(drift[1] - drift[0]) / np.abs(stress).max():.0f} % "
+            f"at {tested.control.name} {course[-1]:.4g}, {100 * share:.0f} % "
             "of the largest apart: the zero of the load cell drifts, or the specimen has changed for good; to fit one "
             "branch give --branch loading, and for a zero that is not sure --tolerance "
             f"zero={abs(drift[1] - drift[0]) / 2 / tested.unit.to_mpa:.2g}.",
+            "large-drift" if share > LARGE_DRIFT else "",
         )
 
 

@@ -179,7 +179,7 @@ def read_covariates(path: str | os.PathLike[str], specimens: Collection[str]) ->
         When there is no such table in the file.
     """
     workbook = file_format(path)
-    lines = next(iter(workbook.sheets(os.fspath(path)).values()), []) if workbook else read_lines(path)
+    lines = next(iter(workbook.lines_by_sheet(os.fspath(path)).values()), []) if workbook else read_lines(path)
     numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
     if len(numbered) < 2:
         raise InputError(

@@ -4,27 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import is_of_mean, of_spread, without_mean
+from tissuq.experiments.reading.headings import is_of_mean, of_spread, plain, without_mean
 from tissuq.experiments.reading.loads import Load
 from tissuq.experiments.reading.recognition import PRESSURE, ColumnChoice, find_column
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.vocabulary import COUNT_NAMES, ROLE_OF_AXIAL_STRETCH, ROLES, SPREADS
+from tissuq.experiments.reading.vocabulary import (
+    COUNT_NAMES,
+    LOWER_ENDS,
+    ROLE_OF_AXIAL_STRETCH,
+    ROLES,
+    SPREADS,
+    STATED_COUNT,
+    UPPER_ENDS,
+)
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
 UPPER = 0.975
 """Upper end of an interval of 95 %."""
+MOST_ROWS = 0.9
+"""Share of the rows from which on a stress that lies between two columns is taken to be the middle of error bars."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spread:
     """Standard errors (n,) of the mean stress, MPa, their column, what that holds, and how they were obtained.
 
-    ``problem`` says why a column is not used; where there is none, ``column`` is None.
+    ``problem`` says why a column is not used, or two columns of ends of error bars; otherwise ``column`` is None where
+    there is none.
     """
 
     column: int | None = None
@@ -99,7 +111,9 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
     """
     quantities = table.quantities
     of_stress = quantities[choice.stress]
-    if any(map(is_of_mean, quantities)) and not is_of_mean(of_stress):
+    ends = set(chain(*_ends(table, choice)))
+    is_mean = [is_of_mean(quantity) for column, quantity in enumerate(quantities) if column not in ends]
+    if any(is_mean) and not is_of_mean(of_stress):
         return Spread()
     by_kind: dict[str, list[int]] = {}
     for column in range(len(table.names)):
@@ -109,7 +123,7 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
             without_mean(of_stress),
             *ROLES[choice.load],
         )
-        if kind and is_of_load and not table.is_constant(column):
+        if kind and is_of_load and column not in ends and not table.is_constant(column):
             by_kind.setdefault(kind, []).append(column)
     for kind in (*SPREADS, ""):
         columns = by_kind.get(kind or "open", [])
@@ -119,10 +133,54 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
             label, key = table.label(column), table.key(column)
             problem = (
                 f"column {label} may hold standard deviations or standard errors of the stress, and is not used. Say "
-                f"which: --column 'sem={key}', or --column 'sd={key}' with the number of specimens (--mean-of 6)."
+                f"which: --column 'sem={key}', or --column 'sd={key}' with the number of specimens "
+                f"({_option_of_count(table)})."
             )
             return Spread(column, kind, problem="" if kind else problem)
-    return Spread()
+    return Spread(problem=_ends_of_error_bars(table, choice))
+
+
+def _ends(table: Table, choice: ColumnChoice) -> tuple[list[int], list[int]]:
+    """Return the columns that may be of the upper ends of error bars, and of the lower ones."""
+    others = [column for column in range(len(table.names)) if column not in (choice.stress, choice.deformation)]
+    upper = [column for column in others if UPPER_ENDS.search(table.quantities[column])]
+    with_minus = {plain(table.quantities[column].replace("+", " ")) for column in upper}  # a minus reads as a blank
+    is_lower = {column: LOWER_ENDS.search(table.quantities[column]) for column in others}
+    lower = [column for column in others if is_lower[column] or table.quantities[column] in with_minus]
+    return upper, [column for column in lower if column not in upper]
+
+
+def _ends_of_error_bars(table: Table, choice: ColumnChoice) -> str:
+    """Return in words that two columns are error bars, which are not read; empty where no two are."""
+    for upper, lower in zip(*_ends(table, choice), strict=False):
+        try:
+            above, below, stress = table.numbers([upper, lower, choice.stress])
+        except InputError:
+            continue
+        names = table.label(upper), table.label(lower)
+        if ((below <= stress) & (stress <= above) & (below < above)).mean() > MOST_ROWS:
+            half = "half of {} - {}".format(*names)
+        elif "err" in table.quantities[upper] and (np.minimum(above, below) >= 0).all():
+            half = "the mean of {} and {}".format(*names)
+        else:
+            continue
+        return (
+            f"columns {' and '.join(names)} look like error bars of the stress, and are not used. If they are, write "
+            f"{half} into a column 'SEM' (standard errors of a mean), or 'SD' (standard deviations between specimens) "
+            f"with their number ({_option_of_count(table)})."
+        )
+    return ""
+
+
+def _option_of_count(table: Table) -> str:
+    """Return the option for the number of specimens: with that which a line above the table or a name states."""
+    above = [(f"{table.counted} {number}", text) for number, text in table.head]
+    lines = [*above, *(("a name", name) for name in table.names)]
+    for place, text in lines:
+        if match := STATED_COUNT.search(text):
+            number = match["number"] or match["specimens"]
+            return f"--mean-of {number}, if that is what {place} means by '{match[0].strip()}'"
+    return "--mean-of 6"
 
 
 def _with_errors(
@@ -152,8 +210,8 @@ def _with_errors(
     elif spread.kind == "sd":
         raise InputError(
             f"{table.place(column)} is taken for standard deviations between specimens. How far their mean may be off "
-            "is the standard error, sd / sqrt(n): give the number of specimens (--mean-of 6), or if these are standard "
-            f"errors --column 'sem={table.key(column)}'."
+            f"is the standard error, sd / sqrt(n): give the number of specimens ({_option_of_count(table)}), or if "
+            f"these are standard errors --column 'sem={table.key(column)}'."
         )
     return replace(spread, standard_error=values * scale, source=source)
 

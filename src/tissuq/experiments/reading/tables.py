@@ -121,7 +121,7 @@ def read_tables(
 def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | int | None) -> tuple[Table, ...]:
     """Return the tables in a file, which a time of change and a size (bytes) stand for."""
     if (workbook := file_format(path)) is not None:
-        every_sheet = workbook.sheets(path)
+        every_sheet = workbook.lines_by_sheet(path)
         short = {name: list(enumerate(lines, 1)) for name, lines in every_sheet.items() if len(lines) <= SHORT}
         sheets = sheets_with_tables(path, every_sheet, sheet)
         tables = list[Table]()

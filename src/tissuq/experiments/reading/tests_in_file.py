@@ -20,9 +20,10 @@ from tissuq.experiments.reading.column_checks import check_machine, check_sectio
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
+from tissuq.experiments.reading.findings import cautions
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.python_form import refusals_worded_for, wording_for
+from tissuq.experiments.reading.python_form import in_python, refusals_worded_for
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
@@ -68,8 +69,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     Warns
     -----
     UserWarning
-        Of units or a zero of displacements that were assumed, of dimensions that the file states otherwise, and of
-        rows, columns and tables that cannot be used and are left out.
+        As `tissuq.read` does, and of tables that are left out.
 
     Raises
     ------
@@ -91,10 +91,10 @@ def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False)
         plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
         tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
     names_of_text = dict[str, list[str]]()
-    for name, text in dict.fromkeys((test.name, text) for test in tests for text in test.reading.notes):
-        names_of_text.setdefault(text, []).append(name)
+    for test in tests:
+        for text in dict.fromkeys(cautions(test.reading)):
+            names_of_text.setdefault(in_python(text, test.reading.experiment.stress_unit), []).append(test.name)
     for text, names in names_of_text.items():
-        text = wording_for(path)(text)
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=3)
     return [test.reading.experiment for test in tests]
 

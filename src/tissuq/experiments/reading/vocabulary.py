@@ -257,6 +257,17 @@ COUNT_NAMES = re.compile(
 """Names of a column that tells of how many specimens a mean is."""
 
 
+STATED_COUNT = re.compile(
+    r"(?<![\w-])n\s*[=:]\s*(?P<number>\d+)(?![\d.,]\d|\d)|(?:mean|average) of (?P<specimens>\d+)\b", re.IGNORECASE
+)
+"""How a line, or the name of a column, states it."""
+
+
+UPPER_ENDS = re.compile(r"\b(upper|max(imum)?|high)\b|\+ ?(1 ?)?(sd|sem|se|std|error|err)\b")
+LOWER_ENDS = re.compile(r"\b(lower|min(imum)?|low)\b|[−–] ?(1 ?)?(sd|sem|se|std|error|err)\b")
+"""Names of columns of the upper and of the lower ends of error bars."""
+
+
 CYCLE_NAMES = names_of(
     "cycle, cycles, cycle count, cycle number, total cycles, total cycle count, "
     "zyklus, zyklen, цикл, циклы, номер цикла, 循环, 循环次数, 周期, サイクル"
