@@ -73,7 +73,10 @@ def _check_parameters(material: Material, discrepancy: Discrepancy, noise: Noise
             f"a matrix, as in 'neo-hookean+{material.name}'."
         )
     of_material = {parameter.symbol: parameter for parameter in material.parameters}
-    parts = {f"discrepancy '{discrepancy.name}' adds": discrepancy, f"noise '{noise.name}' has": noise}
+    parts: dict[str, Discrepancy | Noise] = {
+        f"discrepancy '{discrepancy.name}' adds": discrepancy,
+        f"noise '{noise.name}' has": noise,
+    }
     for has, part in parts.items():
         shared = [parameter for parameter in part.parameters if parameter.symbol in of_material]
         if not shared:
