@@ -239,6 +239,8 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
     assert said.status == 0, said.err
     said = run_in(tmp_path, "predict", "run", "--at", "1.1", "--out", "predicted", "--no-figures")
     assert said.status == 0, said.err
+    assert "fitted to what a forward model was calibrated on" in " ".join(said.out.split())
+    assert "measurements)" not in said.out  # the points of the range are none
     row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
     median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))
     assert median == pytest.approx(3 * (1.1 - 1.1**-2), rel=0.01)  # kPa

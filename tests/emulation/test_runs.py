@@ -113,6 +113,48 @@ def test_the_values_of_the_module_are_part_of_a_function(monkeypatch):
     assert as_forward(of_the_module).identity != before
 
 
+NOTES = {}
+SETTINGS = {"factor": 2.0}
+
+
+def noting(parameters, depth):
+    key = parameters["C10"]
+    if key not in NOTES:
+        NOTES[key] = SETTINGS["factor"] * parameters["C10"] * depth
+    return NOTES[key]
+
+
+class Noting:
+    def __init__(self, factor):
+        self.notes, self.settings = {}, {"factor": factor}
+
+    def __call__(self, parameters, depth):
+        self.notes[parameters["C10"]] = result = self.settings["factor"] * parameters["C10"] * depth
+        return result
+
+
+def noting_around(factor):
+    notes, settings = {}, {"factor": factor}
+
+    def force(parameters, depth):
+        notes[parameters["C10"]] = result = settings["factor"] * parameters["C10"] * depth
+        return result
+
+    return force
+
+
+@pytest.mark.parametrize("make", [lambda factor: noting, Noting, noting_around])
+def test_a_dictionary_in_which_a_function_notes_its_results_is_no_part_of_it(make, monkeypatch):
+    """A second call refused the runs of the first one; settings in a dictionary still count."""
+    force = make(2.0)
+    forward = as_forward(force)
+    before = forward.identity
+    forward.run({"C10": 1.5}, DEPTH)
+    assert as_forward(force).identity == before
+    monkeypatch.setitem(SETTINGS, "factor", 3.0)
+    assert as_forward(make(3.0)).identity != before
+
+
 @pytest.mark.parametrize(
     ("place", "content", "words"),
     [

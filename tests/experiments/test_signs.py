@@ -9,10 +9,10 @@ import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
 
-LENGTH, AREA = 5.0, 300.0
+LENGTH, AREA = 20.0, 300.0
 BOTH_WAYS = np.concatenate([np.linspace(1, 1.15, 30), np.linspace(1.15, 0.85, 60)])
 COMPRESSION = np.concatenate([np.ones(20), np.linspace(1, 0.7, 60)])
-SIZES = {"length": "5 mm", "area": "300 mm2"}
+SIZES = {"length": "20 mm", "area": "300 mm2"}
 
 
 def read(folder, name, deformation, force, **options):
@@ -133,9 +133,14 @@ def test_negative_numbers_of_a_test_that_is_called_tension_are_asked_about(tmp_p
 
 DISC = "Durchmesser;20,61;mm\nProbenhöhe;9,23;mm\n"
 BLOCK = "Breite;12,0;mm\nDicke;11,0;mm\nMesslänge;9,23;mm\n"
+SECTION = "Fläche;333,6;mm2\nMesslänge;9,23;mm\n"
 
 
-@pytest.mark.parametrize(("head", "area"), [(DISC, np.pi / 4 * 20.61**2), (BLOCK, 132.0)], ids=["disc", "block"])
+@pytest.mark.parametrize(
+    ("head", "area"),
+    [(DISC, np.pi / 4 * 20.61**2), (BLOCK, 132.0), (SECTION, 333.6)],
+    ids=["disc", "block", "area alone"],
+)
 def test_positive_numbers_of_a_specimen_broader_than_long_are_asked_about(tmp_path, head, area):
     path = tmp_path / "Leber.csv"
     columns = 9.23 * (1 - COMPRESSION), -area * neo_hookean(COMPRESSION)

@@ -184,6 +184,22 @@ def test_auto_says_where_load_begins_and_hands_its_uncertainty_to_the_fit(tmp_pa
     assert reading.used.dropped[0].reason == "before load begins"
 
 
+@pytest.mark.parametrize("preload", ["auto", "0.05 kPa"])
+@pytest.mark.parametrize("cycle", [1, 2, None])
+def test_unloading_is_counted_from_where_load_begins_on_the_way_there(tmp_path, preload, cycle):
+    """Of an elastic specimen both ways are one curve. The way back was counted from its first row, the peak, or not."""
+    way = np.concatenate([ramp := np.linspace(0, 0.4, 101), ramp[-2::-1], ramp[1:], ramp[-2::-1]])
+    stretch = 1 + np.maximum(way - 0.08, 0) / 1.08
+    path = tmp_path / "test.csv"
+    rows = "".join(f"{20 * w:.6f},{100 * (x - x**-2):.6f}\n" for w, x in zip(way, stretch, strict=True))
+    path.write_text("Displacement (mm),Stress (kPa)\n" + rows)
+    options = {"length": "20 mm", "preload": preload, "cycle": cycle}
+    there, back = (tq.read(path, branch=branch, **options) for branch in ("loading", "unloading"))
+    assert len(back) == len(there)
+    np.testing.assert_allclose(np.sort(back.stretch), np.sort(there.stretch), rtol=1e-9)
+    assert back.stretch.max() == pytest.approx(stretch.max(), abs=0.01)
+
+
 def test_auto_leaves_a_test_without_slack_as_it_is_and_says_so(tmp_path):
     path = slack_file(tmp_path, "stretch,stress [kPa]", np.linspace(1, 1.4, 101), 1.0)
     reading = read_file(path, preload="auto")

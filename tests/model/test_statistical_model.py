@@ -116,6 +116,18 @@ def test_a_law_of_ones_own_that_uses_the_names_of_an_amplitude_is_to_be_renamed(
         model("auto", law)
 
 
+@pytest.mark.parametrize(("noise", "symbol"), [("unknown", "noise_sd"), ("proportional", "noise_share")])
+def test_a_law_of_ones_own_that_uses_the_name_of_the_noise_is_to_be_renamed(noise, symbol):
+    """One of the two numbers stood for both, without a word."""
+    law = tq.FunctionLaw({
+        "noise_sd": lambda I1, I2, C10, noise_sd: C10 * (I1 - 3) + noise_sd * (I2 - 3),
+        "noise_share": lambda I1, I2, C10, noise_share: C10 * (I1 - 3) + noise_share * (I2 - 3),
+    }[symbol])  # fmt: skip
+    with pytest.raises(tq.ModelError, match=rf"has {symbol}, .* two things\. Rename .* {symbol}_law, .* another noise"):
+        model("none", law, noise_sd=noise)
+    model("none", law, noise_sd=0.1)
+
+
 def test_fewer_points_than_parameters_are_refused():
     few = tq.Experiment("uniaxial", [0.9, 1.1, 1.2], [-0.3, 0.3, 0.5])
     with pytest.raises(tq.InputError, match="3 measurements for 5 parameters"):

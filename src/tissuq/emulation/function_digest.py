@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from hashlib import sha256
 from pathlib import PurePath
+from textwrap import dedent
 from types import CodeType, FunctionType, MethodType
 from typing import Any
 
@@ -23,8 +26,8 @@ def function_digest(function: Callable[..., Any]) -> str:
 
     Its code, its defaults, the values around it (of a closure, of `functools.partial`, of an object that is called or
     whose method it is), and what it names of its module: numbers, texts, arrays, tuples, dictionaries, and functions
-    and classes that are written there, with theirs. Not what it takes from other modules and files, nor lists, in which
-    functions note their calls.
+    and classes that are written there, with theirs. Not what it takes from other modules and files, nor lists and
+    dictionaries in which it notes its calls: lists, and dictionaries in which it writes under keys that it computes.
 
     Examples
     --------
@@ -36,17 +39,20 @@ def function_digest(function: Callable[..., Any]) -> str:
     module = getattr(function, "__module__", None) or type(function).__module__
     if isinstance(function, partial):
         module = getattr(inspect.unwrap(function.func), "__module__", module)
-    return sha256("\n".join(_lines(function, module, set())).encode()).hexdigest()[:PLACES]
+    return sha256("\n".join(_lines(function, module, {})).encode()).hexdigest()[:PLACES]
 
 
-def _lines(value: Any, module: str, seen: set[int]) -> Iterator[str]:
-    """Yield what describes a value; of modules, and of functions and objects of others, no more than their names."""
+def _lines(value: Any, module: str, seen: dict[int, Any]) -> Iterator[str]:
+    """Yield what describes a value; of modules, and of functions and objects of others, no more than their names.
+
+    What was seen is kept, so that nothing else takes its place in the memory.
+    """
     if isinstance(value, PLAIN):
         yield repr(value)
         return
     if id(value) in seen:
         return
-    seen.add(id(value))
+    seen[id(value)] = value
     yield type(value).__qualname__
     if isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape} {sha256(np.ascontiguousarray(value).tobytes()).hexdigest()}"
@@ -81,22 +87,43 @@ def _parts(value: Any, module: str) -> Iterator[Any]:
         yield value.__wrapped__
     elif type(value).__module__ == module:
         yield type(value)
-        yield object.__getstate__(value)
+        methods = (method for base in type(value).__mro__ for method in vars(base).values())
+        yield _without_notes(object.__getstate__(value), filter(inspect.isfunction, methods))
 
 
 def _parts_of_function(function: FunctionType) -> Iterator[Any]:
     yield _source(function) or function.__code__.co_code
     yield function.__defaults__
     yield function.__kwdefaults__
-    for cell in function.__closure__ or ():
-        try:
-            yield cell.cell_contents
-        except ValueError:  # not yet bound
+    around = dict[str, Any]()
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # not yet bound
+            around[name] = cell.cell_contents
+    yield from _without_notes(around, [function]).values()
+    used = {name: function.__globals__[name] for name in _names(function.__code__) if name in function.__globals__}
+    for pair in _without_notes(used, [function]).items():
+        yield from pair
+
+
+def _without_notes(values: Any, functions: Iterable[FunctionType]) -> Any:
+    """Return values by name without dictionaries in which functions note what they have computed."""
+    if not isinstance(values, dict):
+        return values
+    notes = {name for function in functions for name in _written(function)}
+    return {name: value for name, value in values.items() if not (isinstance(value, dict) and name in notes)}
+
+
+def _written(function: FunctionType) -> Iterator[str]:
+    """Yield the names of what a function writes into under keys that it computes."""
+    try:
+        tree = ast.parse(dedent(_source(function)))
+    except SyntaxError:  # a part of an expression
+        return
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Subscript) or not isinstance(node.ctx, ast.Store):
             continue
-    for name in dict.fromkeys(_names(function.__code__)):
-        if name in function.__globals__:
-            yield name
-            yield function.__globals__[name]
+        if not isinstance(node.slice, ast.Constant) and isinstance(node.value, ast.Name | ast.Attribute):
+            yield node.value.id if isinstance(node.value, ast.Name) else node.value.attr
 
 
 def _names(code: CodeType) -> Iterator[str]:

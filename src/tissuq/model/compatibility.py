@@ -33,13 +33,13 @@ def check_parts(
     Raises
     ------
     ModelError
-        When the material does not deform as a mode says, it is no material by itself, the discrepancy has a parameter
-        of it, or discrepancy, noise and tolerances take up the same errors.
+        When the material does not deform as a mode says, it is no material by itself, discrepancy or noise have a
+        parameter of it, or discrepancy, noise and tolerances take up the same errors.
     InputError
         When there is not one known noise for each test, or the noise needs one test, with repeats.
     """
     _check_modes(material, discrepancy, experiment)
-    _check_parameters(material, discrepancy)
+    _check_parameters(material, discrepancy, noise)
     _check_errors(discrepancy, noise, tolerances, experiment)
 
 
@@ -66,25 +66,29 @@ def check_lateral_stretch(material: Material, discrepancy: Discrepancy, states: 
         )
 
 
-def _check_parameters(material: Material, discrepancy: Discrepancy) -> None:
+def _check_parameters(material: Material, discrepancy: Discrepancy, noise: Noise) -> None:
     if material.needs_matrix:
         raise ModelError(
             f"material '{material.name}' consists of fibres only, without stiffness where they are not stretched: add "
             f"a matrix, as in 'neo-hookean+{material.name}'."
         )
     of_material = {parameter.symbol: parameter for parameter in material.parameters}
-    shared = [parameter for parameter in discrepancy.parameters if parameter.symbol in of_material]
-    if shared:
+    parts: dict[str, Discrepancy | Noise] = {
+        f"discrepancy '{discrepancy.name}' adds": discrepancy,
+        f"noise '{noise.name}' has": noise,
+    }
+    for has, part in parts.items():
+        shared = [parameter for parameter in part.parameters if parameter.symbol in of_material]
+        if not shared:
+            continue
         symbols = ", ".join(parameter.symbol for parameter in shared)
         advice = (
             "no data can separate the two. Choose another material or discrepancy."
             if any(parameter.description == of_material[parameter.symbol].description for parameter in shared)
             else "a name for two things. Rename those of the material, as in "
-            f"{shared[0].symbol} to {shared[0].symbol}_law, or choose another discrepancy."
+            f"{shared[0].symbol} to {shared[0].symbol}_law, or choose another {has.partition(' ')[0]}."
         )
-        raise ModelError(
-            f"discrepancy '{discrepancy.name}' adds {symbols}, which material '{material.name}' has already: {advice}"
-        )
+        raise ModelError(f"{has} {symbols}, which material '{material.name}' has already: {advice}")
 
 
 def _check_errors(discrepancy: Discrepancy, noise: Noise, tolerances: Tolerances, experiment: Experiment) -> None:

@@ -135,8 +135,9 @@ class PopulationDraws:
         Returns
         -------
         pandas.DataFrame
-            Indexed by parameter and quantity: ``median`` (of the population), ``spread`` (between specimens: sd of the
-            logarithm, or of a parameter of either sign itself), ``new specimen``, and ``complete pooling``, whose
+            Indexed by parameter and quantity: ``median`` (of the population; with covariates at the mean of numbers and
+            at reference levels, also where those of the new specimen are given), ``spread`` (between specimens: sd of
+            the logarithm, or of a parameter of either sign itself), ``new specimen``, and ``complete pooling``, whose
             interval is one for specimens that were all the same: it is no range of patients. Columns median, hdi_low
             and hdi_high; the unit of stresses stands at their head.
         """

@@ -43,6 +43,8 @@ class Population(PopulationDraws):
     def given(self, covariates: Mapping[str, Any]) -> Population:
         """Return the same population with a new patient of whom covariates are known, such as ``{"age": 60}``.
 
+        The median of the population stays where it is: at the mean of the numbers and at the reference levels.
+
         Raises
         ------
         InputError

@@ -17,6 +17,7 @@ from tissuq.arrays import FloatArray
 from tissuq.assessment.uses import COMPUTING, UNKNOWN, Use
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
+from tissuq.emulation.material_posterior import CALIBRATION
 from tissuq.errors import InputError
 from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
@@ -94,10 +95,14 @@ def prediction_result(
         tables.append(score_table(prediction, prediction.scores, prediction.data.name))
     model = prediction.posterior.model
     measured = " and ".join(f"{test.mode.name} ({len(test)} {test.rows_name})" for test in model.experiment.tests)
+    source = f"fitted to {named(model.experiment)}"
+    if prediction.posterior.solution.route == CALIBRATION:  # its tests stand for a range of stretches
+        source = "calibrated with a forward model"
+        measured = "what a forward model was calibrated on"
     run = Path(settings.run).name or settings.run
     return Result(
         command=f"predict{f' --user-law {law}' if law else ''}",
-        title=f"Predicted stress: {prediction.mode.name}, by {model.material.name} fitted to {named(model.experiment)}",
+        title=f"Predicted stress: {prediction.mode.name}, by {model.material.name} {source}",
         subject=f"run {run}: {model.material.name}, discrepancy {model.discrepancy.name}, fitted to {measured}",
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
         finding=_lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction),

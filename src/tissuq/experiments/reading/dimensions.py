@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isclose, pi, prod
+from math import isclose, pi, prod, sqrt
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
@@ -23,7 +23,7 @@ HOW_TO_GIVE_SECTION = (
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
 BREADTHS = ("diameter",), ("width", "thickness")
-"""Sizes that say how broad a specimen is, not only how much area it has."""
+"""Sizes that say how broad a specimen is; an area alone tells it of a round one."""
 EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
 PLURALS = {"thickness": "thicknesses"}
 """Of names of sizes that do not end in s alone."""
@@ -190,15 +190,20 @@ class Dimensions:
     @property
     def broad_in_words(self) -> str:
         """That the specimen is broader than long, if its sizes say so: such specimens are rather compressed."""
-        names = next((names for names in BREADTHS if {*names, "length"} <= self.sizes.keys()), ())
-        breadth = min((self.sizes[name].value for name in names), default=0.0)
-        if not names or self.sizes["length"].unit == PIXELS.unit or breadth <= self.sizes["length"].value:
+        length = self.sizes.get("length")
+        if length is None or length.unit == PIXELS.unit:
             return ""
-        sides = " x ".join(f"{self.sizes[name].value:g}" for name in names)
-        return (
-            f"the specimen is broader ({sides} mm) than long ({self.sizes['length'].value:g} mm), as specimens for "
-            "compression are"
-        )
+        if names := next((names for names in BREADTHS if self.sizes.keys() >= {*names}), ()):
+            sides = [self.sizes[name].value for name in names]
+            words = " x ".join(f"{side:g}" for side in sides) + " mm"
+        elif "area" in self.sizes:
+            sides = [sqrt(4 / pi * self.sizes["area"].value)]
+            words = f"{sides[0]:.3g} mm across if it is round, by its area"
+        else:
+            return ""
+        if min(sides) <= length.value:
+            return ""
+        return f"the specimen is broader ({words}) than long ({length.value:g} mm), as specimens for compression are"
 
     def _size(self, name: str, advice: str) -> Dimension:
         """Return a size that must be known, and be stated once."""

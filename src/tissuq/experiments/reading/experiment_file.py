@@ -333,17 +333,22 @@ def read_rows(
     recorded = with_signs(measured, choices, options, direction, shape)
     reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
     cycles = find_cycles(table, recorded.course, reference)
-    used = recorded.of_cycle(cycles, options.get("cycle"), options.get("branch"))
-    if (lines := options.get("leave_out")) is not None:
-        used = used.without_lines(lines, absent)
+    branch, lines = options.get("branch"), options.get("leave_out")
+    used, begun = (
+        rows if lines is None else rows.without_lines(lines, absent)
+        for rows in (
+            recorded.of_cycle(cycles, options.get("cycle"), which)
+            for which in (branch, None if branch == "unloading" else branch)  # load begins on the way there
+        )
+    )
     if (preload := options.get("preload")) == AUTO:
-        slacks = [tested.slack for tested in tested_stresses(used, mode, shown)]
+        slacks = [tested.slack for tested in tested_stresses(begun, mode, shown)]
         used = used.loaded(slacks, reference)
         sds = [slack.sd / (slack.stretch if reference else 1.0) for slack in slacks if slack]
         errors = {"slack": max(sds)} if sds else errors
     elif preload is not None:
         thresholds = [load.stress_in(preload) for load in loads]
-        used = used.taut(preload, thresholds, find_cycles(used.table, used.course, reference)[0].peak, reference, shown)
+        used = used.taut(preload, thresholds, begun, reference, shown)
     if (stretch_range := options.get("stretch_range")) is not None:
         used = used.within(*stretch_range)
     if options.get("until_peak"):

@@ -233,28 +233,29 @@ class MeasuredRows:
         return replace(self, stretch=self.stretch / starts if reference else self.stretch - starts)
 
     def taut(
-        self, preload: str, thresholds: Sequence[float], peak: int, reference: float, unit: StressUnit
+        self, preload: str, thresholds: Sequence[float], begun: MeasuredRows, reference: float, unit: StressUnit
     ) -> MeasuredRows:
         """Return the rows in which every axis carries the preload, with stretches counted from where it first does.
 
-        That is where the absolute stress last rises through its threshold (MPa) on the way to the row ``peak``,
-        interpolated between the rows on either side: there stretch 1 is, and the gauge length with it. Stresses stay
-        as they are.
+        That is where the absolute stress last rises through its threshold (MPa) on the way to the first peak of the
+        rows ``begun``, the same ones or, of unloading, with the loading before: interpolated between the rows on either
+        side. There stretch 1 is, and the gauge length with it. Stresses stay as they are.
 
         Raises
         ------
         InputError
             When no row carries the preload.
         """
+        peak = find_cycles(begun.table, begun.course, reference)[0].peak
         pairs = enumerate(thresholds)
-        starts = [_taut_start(self, number, preload, threshold, peak, unit) for number, threshold in pairs]
+        starts = [_taut_start(begun, number, preload, threshold, peak, unit) for number, threshold in pairs]
         if reference and (not_positive := next((start for start in starts if start.stretch <= 0), None)):
             raise InputError(
                 f"{self.table.file}: where the preload {preload} is reached ({not_positive.lines}), the "
                 f"stretch is {not_positive.stretch:g}, not positive. Check the length of the specimen and the column "
                 "of displacements."
             )
-        is_after = np.arange(len(self)) >= np.array([[start.row] for start in starts])
+        is_after = self.rows >= begun.rows[[[start.row] for start in starts]]
         carries = is_after & (np.abs(self.stress) >= np.array(thresholds)[:, None])
         is_taut = carries.all(axis=0)
         reason = f"carrying less than {preload}"
