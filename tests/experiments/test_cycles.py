@@ -4,8 +4,9 @@ import pytest
 from machine_files import cycles as made
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.measured_rows import find_cycles
+from tissuq.experiments.reading.read import read_experiment
 
 
 @pytest.fixture

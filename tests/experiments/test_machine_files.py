@@ -7,7 +7,8 @@ import pytest
 
 from machine_files import LAYOUTS, biotester, instron, instron_compression, univert, wintest, zwick
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_file
+from tissuq.experiments.reading.read import read_experiment
 
 
 def message(path, **options):

@@ -10,9 +10,9 @@ from scipy.linalg import logm
 
 import tissuq as tq
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import read_experiment
 from tissuq.experiments.reading.headings import measure_in
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
+from tissuq.experiments.reading.read import read_experiment
 
 MU = 0.04  # MPa
 STRETCH = np.array([0.8, 0.9, 1.0, 1.2, 1.5])

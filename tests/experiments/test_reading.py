@@ -6,7 +6,8 @@ import pytest
 
 from marks import slow_but
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_file
+from tissuq.experiments.reading.read import read_experiment
 
 pytestmark = pytest.mark.filterwarnings("ignore:check the unit:UserWarning")  # many headings here state no unit
 

@@ -7,7 +7,8 @@ import tissuq as tq
 from planted import LAWS, STIFFENING, Planting
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
-from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_file
+from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.slack import find_slack
 
 LENGTH, SLACK, STIFFNESS = 20.0, 1.5, 0.4

@@ -8,8 +8,8 @@ from scipy.stats import t
 
 import tissuq as tq
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import read_experiment
 from tissuq.experiments.reading.headings import of_spread
+from tissuq.experiments.reading.read import read_experiment
 
 STRETCH = np.linspace(1.0, 1.3, 7)
 STRESS = 100 * (STRETCH - STRETCH**-2)  # kPa

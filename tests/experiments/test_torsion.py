@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import read_experiment
+from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.twisted_disc import apparent_stress, rim_stress
 from tissuq.experiments.units import TORQUE
 

@@ -8,8 +8,9 @@ import pytest
 import tissuq as tq
 from machine_files import C01, C10, biotester_protocols, mooney_rivlin
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.read import read_experiment
 
 STRETCH = np.array([[1.0, 1.0], [1.1, 1.05], [1.2, 1.1], [1.3, 1.15]])
 STRESS = mooney_rivlin(STRETCH)

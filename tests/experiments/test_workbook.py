@@ -10,8 +10,9 @@ import pytest
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading import workbooks
-from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.inspection import inspect
+from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.tests_in_file import read_tests
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")

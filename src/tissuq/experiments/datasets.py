@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.experiment_file import read_experiment
+from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.text_file import DATA_SETS
 
 if TYPE_CHECKING:

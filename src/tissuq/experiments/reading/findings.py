@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -16,6 +15,7 @@ from tissuq.experiments.modes import Biaxial, Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.axial_stretch import note_of_stretched_tube
 from tissuq.experiments.reading.disturbances import scatter_of_neighbours
+from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import Cycle, labelled
 from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
@@ -26,9 +26,6 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, ROLES
 from tissuq.experiments.units import stress_unit
 from tissuq.result_warning import ResultWarning, Severity
-
-if TYPE_CHECKING:
-    from tissuq.experiments.reading.experiment_file import Reading
 
 MIN_ROWS_PER_CYCLE = 10
 """Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
