@@ -72,12 +72,15 @@ def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
     """
     labels = reading.used.labels
     warnings = [ResultWarning(text, *DOUBTFUL if is_doubtful(text) else CAUTION) for text in reading.notes]
-    for kind in dict.fromkeys(region.kind for regions in reading.regions for region in regions):
-        of_kind = [[region for region in regions if region.kind == kind] for regions in reading.regions]
-        texts = labelled(labels, [" ".join(region.text for region in regions) for regions in of_kind])
+    for kind_and_code in dict.fromkeys((region.kind, region.code) for regions in reading.regions for region in regions):
+        kind, stated = kind_and_code
+        of_kind = (
+            [region.text for region in regions if (region.kind, region.code) == kind_and_code]
+            for regions in reading.regions
+        )
+        texts = labelled(labels, [" ".join(sentences) for sentences in of_kind])
         code, severity = REGION_CODES.get(kind, CAUTION)
-        codes = [next((region.code for region in regions if region.code), code) for regions in of_kind]
-        warnings += [ResultWarning(text, code, severity) for text, code in zip(texts, codes, strict=True) if text]
+        warnings += [ResultWarning(text, stated or code, severity) for text in texts if text]
     for check, code_and_severity in CHECKS.items():
         texts = labelled(labels, [check(reading, number) for number in range(len(labels))])
         warnings += [ResultWarning(text, *code_and_severity) for text in texts if text]
