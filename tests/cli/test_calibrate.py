@@ -256,7 +256,8 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
 def test_stresses_in_another_unit_than_the_law_are_refused_until_the_unit_of_the_model_is_said(tmp_path):
     write_cube(tmp_path, "stress (kPa)")
     usual = ["calibrate", "cube.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
-    material = ["--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2", "--out", "run"]
+    usual += ["--noise-sd", 0.02, "--discrepancy", "none", "--no-figures"]
+    material = ["--material", "neo-hookean", "--range", "0.7:1.2", "--out", "run"]
     said = run_in(tmp_path, *usual, *material)
     assert said.status == 2
     assert "--unit kPa or --unit MPa" in " ".join(said.err.split())
@@ -272,7 +273,8 @@ def test_forces_and_depths_that_go_with_another_unit_than_the_law_are_refused(cl
     rows = "".join(f"{depth / 10},{16 * 1.5 * depth / 10}\n" for depth in range(1, 13))
     (here / "punch.csv").write_text(f"depth (mm),force ({force})\n{rows}")
     usual = ["calibrate", "punch.csv", "--forward", "punch.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
-    said = cli(*usual, "--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2")
+    usual += ["--noise-sd", 0.02, "--discrepancy", "none", "--no-figures"]
+    said = cli(*usual, "--material", "neo-hookean", "--range", "0.7:1.2")
     assert said.status == (2 if is_refused else 0), said.err
     words = "the forces are in mN and the controls in mm, and the parameters of neo-hookean would be taken in MPa"
     assert (words in said.err and "--unit kPa or --unit MPa" in said.err) == is_refused
@@ -282,7 +284,8 @@ def test_forces_and_depths_that_go_with_another_unit_than_the_law_are_refused(cl
 def test_pressures_in_another_unit_than_the_law_are_refused(cli, here, unit, status):
     write_cube(here, f"pressure ({unit})")
     usual = ["calibrate", "cube.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)", "--runs", 8]
-    said = cli(*usual, "--noise-sd", 0.02, "--no-figures", "--material", "neo-hookean", "--range", "0.7:1.2")
+    usual += ["--noise-sd", 0.02, "--discrepancy", "none", "--no-figures"]
+    said = cli(*usual, "--material", "neo-hookean", "--range", "0.7:1.2")
     assert said.status == status, said.err
     assert ("--unit mmHg or --unit MPa" in " ".join(said.err.split())) == bool(status)
 
@@ -304,7 +307,8 @@ def test_several_specimens_are_refused_until_one_is_read(tmp_path):
     labelled = [f"{name},{row}" for name, test in (("S1", rows), ("S2", others)) for row in test]
     (tmp_path / "both.csv").write_text("\n".join([f"specimen,{heading}", *labelled]))
     arguments = ["calibrate", "both.csv", "--forward", "cube.py:force", "--prior", "C10=uniform(0.5,10)"]
-    arguments += ["--noise-sd", 0.02, "--runs", 8, "--control", "depth", "--measured", "force", "--no-figures"]
+    arguments += ["--noise-sd", 0.02, "--discrepancy", "none", "--runs", 8, "--control", "depth", "--measured", "force"]
+    arguments += ["--no-figures"]
     said = run_in(tmp_path, *arguments, "--out", "run")
     assert said.status == 2
     assert "column 'specimen' names several tests: 'S1', 'S2'. To read one of them give --only 'specimen=S1'." in (
@@ -408,7 +412,7 @@ def test_the_posterior_of_other_measurements_is_a_prior(fitted):
     other = "".join(f"{a},{float(b) + error:.4f}\n" for (a, b), error in zip(rows, noise, strict=True))
     (fitted / "other.csv").write_text("stretch,stress (kPa)\n" + other)
     options = ["--forward", "tension.py:stress", "--material", "neo-hookean", "--range", "1:1.3", "--unit", "kPa"]
-    options += ["--noise-sd", 0.02, "--no-figures"]
+    options += ["--noise-sd", 0.02, "--discrepancy", "none", "--no-figures"]
     said = run_in(fitted, "calibrate", "other.csv", *options, "--prior-run", "run", "--runs", 8, "--out", "other")
     assert said.status == 0, said.err
 

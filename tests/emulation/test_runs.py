@@ -98,7 +98,7 @@ def within(parameters, depth):
 )
 def test_the_runs_of_a_function_with_other_values_around_it_are_not_taken(made, tmp_path):
     """Of the model with half the stiffness; the parameter was that of the runs in the folder, twice too small."""
-    options = {"noise_sd": 0.01, "runs": 8, "folder": tmp_path / "runs"}
+    options = {"discrepancy": "none", "noise_sd": 0.01, "runs": 8, "folder": tmp_path / "runs"}
     measured = 2 * DEPTH
     found = [tq.calibrate(DEPTH, measured, made(2.0), PRIORS, **options) for _ in range(2)]
     assert found[0].marginals["C10"].mean == found[1].marginals["C10"].mean
