@@ -122,6 +122,10 @@ class ResultWarning(str):
         start = f"{', '.join(names)}: "
         return self._written(start + self, start + self.shell, self.severity)
 
+    def in_python(self, text: str) -> ResultWarning:
+        """Return the same warning as a person in Python can type it."""
+        return self._written(text, self.shell, self.severity)
+
     def as_note(self) -> ResultWarning:
         """Return the same warning as a note."""
         return self._written(str(self), self.shell, Severity.NOTE)

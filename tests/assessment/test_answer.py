@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -158,11 +159,18 @@ def test_fibres_are_taken_into_finite_elements_with_care_and_not_with_a_free_ene
     assert "FEBio alone" in posterior.answer.uses[3].reason
 
 
+def answer_with(posterior, warning):
+    """The answer where a warning came with the measurements."""
+    experiment = posterior.model.experiment.labelled(warnings=(warning,))
+    model = replace(posterior.model, experiment=experiment)
+    return replace(posterior, solution=replace(posterior.solution, model=model)).answer
+
+
 @pytest.mark.slow
 def test_what_is_implausible_in_the_measurements_comes_first():
     posterior = yeoh(discrepancy="auto")
     unit = ResultWarning("check the unit: MPa was assumed.", "doubtful-reading", Severity.PROBLEM)
-    answer = posterior.answer_with([unit])
+    answer = answer_with(posterior, unit)
     assert answer.uses[0].verdict is Verdict.NO
     assert answer.next_step.shell == "act on the first warning: it says what to do."
     vague = gallery.fit(
@@ -170,13 +178,13 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     )
     assert vague.answer.uses[0].verdict is not Verdict.YES
     zero = "at stretch 1 the stress is already 4 kPa, which --load-zero first takes off."
-    offset = posterior.answer_with([ResultWarning(zero, "stress-at-rest")])
+    offset = answer_with(posterior, ResultWarning(zero, "stress-at-rest"))
     assert offset.uses[0].verdict is Verdict.NO
     assert "stress at rest" in offset.uses[0].reason
     assert offset.uses[1].verdict is Verdict.CARE
     assert "--load-zero first" in offset.next_step.shell
     drift = "the stress is 0 kPa at the beginning and 1 kPa at the end: to fit one branch give --branch loading."
-    drifted = posterior.answer_with([ResultWarning(drift, "large-drift")])
+    drifted = answer_with(posterior, ResultWarning(drift, "large-drift"))
     assert [use.verdict for use in drifted.uses[:2]] == [Verdict.NO, Verdict.CARE]
     assert "the load drifts" in drifted.uses[0].reason
     assert "the load drifts" in drifted.uses[1].reason
@@ -185,13 +193,13 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     stacked = {"strain (%)": 100 * np.r_[way, way], "stress [kPa]": np.r_[way, further * way]}
     cycles = next(w for w in data_warnings(tq.inspect(pd.DataFrame(stacked)).reading) if "cycles" in w)
     assert "--cycle last" in cycles
-    assert "fit again" not in vague.answer_with([cycles]).next_step.shell  # they may be two specimens
-    assert "it says what to do" in vague.answer_with([cycles]).next_step.shell
+    assert "fit again" not in answer_with(vague, cycles).next_step.shell  # they may be two specimens
+    assert "it says what to do" in answer_with(vague, cycles).next_step.shell
     torn = ResultWarning("the stress falls while the test goes on: give --until-peak.")
-    assert "warning about the measurements" in vague.answer_with([torn]).next_step.shell
+    assert "warning about the measurements" in answer_with(vague, torn).next_step.shell
     slack = ResultWarning("the first 25 rows carry no load: give --preload auto.", "slack")
-    assert "--preload auto" in vague.answer_with([slack]).next_step.shell
-    assert "design" in vague.answer_with([torn.as_note()]).next_step.shell
+    assert "--preload auto" in answer_with(vague, slack).next_step.shell
+    assert "design" in answer_with(vague, torn.as_note()).next_step.shell
     assert "design" in vague.answer.next_step.shell
 
 
@@ -342,7 +350,7 @@ def test_a_fit_that_does_not_describe_its_own_measurements_serves_nothing_else()
 def test_what_is_said_to_be_too_narrow_is_used_with_care_at_best():
     posterior = yeoh(discrepancy="auto")
     correlated = ResultWarning("residuals are autocorrelated.", "correlated-residuals")
-    for use in posterior.answer_with([correlated]).uses[:2]:
+    for use in answer_with(posterior, correlated).uses[:2]:
         assert use.verdict is Verdict.CARE
         assert "the errors of consecutive measurements are correlated" in use.reason
 
@@ -350,7 +358,7 @@ def test_what_is_said_to_be_too_narrow_is_used_with_care_at_best():
 def test_tests_that_contradict_each_other_are_predicted_with_care_at_best():
     posterior = yeoh(discrepancy="auto")
     assert posterior.answer.uses[1].verdict is Verdict.YES
-    answer = posterior.answer_with([ResultWarning("the tests are apart.", "tests-apart")])
+    answer = answer_with(posterior, ResultWarning("the tests are apart.", "tests-apart"))
     for use in answer.uses[1:3]:
         assert use.verdict is Verdict.CARE
         assert "contradict" in use.reason

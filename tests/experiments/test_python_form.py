@@ -12,6 +12,7 @@ import tissuq as tq
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.options import READING_OPTIONS, spelled_out
 from tissuq.experiments.reading.python_form import SWITCHES, in_python
+from tissuq.result_warning import ResultWarning
 from tissuq.studies.answers import READING
 
 STRETCH = np.linspace(1, 1.3, 20)
@@ -88,6 +89,27 @@ def test_a_drift_that_takes_the_modulus_out_of_its_interval_has_a_code_of_its_ow
     (warning, *_) = data_warnings(tq.inspect(pd.DataFrame(there_and_back(drift))).reading)
     assert "the zero of the load cell drifts" in warning
     assert warning.code == code
+
+
+@pytest.mark.filterwarnings("ignore:the stress is:UserWarning")
+def test_what_a_fit_can_be_used_for_does_not_forget_the_file(tmp_path):
+    pd.DataFrame(there_and_back(0.3)).to_csv(tmp_path / "drift.csv", index=False)
+    posterior = tq.fit(tmp_path / "drift.csv", discrepancy="none", noise_sd="1 kPa")
+    posterior.save(tmp_path / "drift.nc")
+    for kept in (posterior, tq.load(tmp_path / "drift.nc")):
+        (warning,) = (text for text in kept.model.experiment.warnings if text.code == "large-drift")
+        assert 'give branch="loading"' in warning
+        assert "give --branch loading" in warning.shell
+        assert kept.answer.uses[0].verdict == "no"
+        assert "the load drifts" in kept.answer.uses[0].reason
+
+
+@pytest.mark.filterwarnings("ignore:the stress is:UserWarning")
+def test_several_tests_say_once_what_was_seen_in_all_and_by_name_what_was_in_one():
+    tests = [tq.read(there_and_back(0.0), name="first"), tq.read(there_and_back(0.05), name="second")]
+    both, one = ResultWarning("seen in both."), ResultWarning("seen in one.")
+    tests = [tests[0].labelled(warnings=(both, one)), tests[1].labelled(warnings=(both,))]
+    assert list(tq.Experiment.of(tests).warnings) == ["all tests: seen in both.", "first: seen in one."]
 
 
 def test_python_does_not_warn_of_a_plain_test_or_of_notes():

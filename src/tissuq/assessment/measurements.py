@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 
 from tissuq.arrays import FloatArray
-from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.experiment import Experiment, labels_of_tests
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import mean_curve
@@ -42,7 +42,8 @@ def falls(experiment: Experiment) -> bool:
 
 
 def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
-    """Yield a warning for each gap in the measured range of a test, with advice what to measure next."""
+    """Yield what was implausible when tests were read, and each gap in what was measured, with what to measure next."""
+    yield from experiment.warnings
     strain = np.concatenate([curve.abscissa - curve.mode.controls[0].reference for curve in experiment.curves])
     reach = float(np.abs(strain).max())
     has_directions = len(experiment.modes) == 1 and experiment.modes[0].controls[0] != SHEAR
@@ -215,9 +216,3 @@ def factors_of_tests(solution: Solution) -> dict[str, float]:
         label: 1 + float(error @ test_curve / (test_curve @ test_curve))
         for label, (error, test_curve) in zip(labels_of_tests(tests), pairs, strict=True)
     }
-
-
-def labels_of_tests(tests: Sequence[Experiment]) -> list[str]:
-    """Return the names of tests, those of the same name numbered by their places among all."""
-    names = [test.name for test in tests]
-    return [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]

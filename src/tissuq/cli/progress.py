@@ -121,12 +121,14 @@ class Monitor:
         import platform
         from importlib.metadata import version
 
+        from tissuq.result_warning import in_shell
+
         lines = [
             f"{self.started_at:%Y-%m-%d %H:%M:%S} UTC  tissuq {version('tissuq')}, Python {platform.python_version()}",
             f"command: {_without_folders()}",
             *(f"{began:8.1f} s  {name}" for name, began in self.stages if name),
             f"{self.seconds:8.1f} s  written",
-            *(f"warning: {' '.join(text.split())}" for text in warnings),
+            *(f"warning: {' '.join(in_shell(text).split())}" for text in warnings),
         ]
         with (folder / LOG).open("a", encoding="utf-8") as file:
             file.write("\n".join(lines) + "\n\n")

@@ -16,6 +16,7 @@ from tissuq.experiments.branches import unloading
 from tissuq.experiments.modes import LoadingMode, Path
 from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import stress_unit
+from tissuq.result_warning import ResultWarning
 
 MAX_WIDTH_OF_MEANS = 0.05
 """Of a control over its range, within half of the groups of measurements that are averaged, and between two."""
@@ -50,6 +51,8 @@ class Curve:
         Those of the test.
     averaged : int
         Consecutive measurements, at most, of which each row is the mean; 1 where rows are single measurements.
+    warnings : tuple of ResultWarning
+        What is implausible in the file that the test was read from, or in its course.
     """
 
     mode: LoadingMode
@@ -65,6 +68,7 @@ class Curve:
     direction: str = ""
     condition: str = ""
     averaged: int = 1
+    warnings: tuple[ResultWarning, ...] = ()
 
     def __len__(self) -> int:
         return len(self.stress)

@@ -20,6 +20,7 @@ from tissuq.experiments.modes import LoadingMode, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
 from tissuq.experiments.units import StressUnit
 from tissuq.experiments.units import stress_unit as stress_unit_of
+from tissuq.result_warning import ResultWarning, merged
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -329,7 +330,13 @@ class Experiment:
         curves = (number for number, curve in enumerate(self.curves) if (curve.mode, curve.channel) == (mode, channel))
         return mode.paths[channel].at(points, next(curves, UNMEASURED))
 
-    def labelled(self, **labels: str | int) -> Experiment:
+    @property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """What is implausible in files and tests that were read, each once with the names of the tests of several."""
+        of_tests = zip(labels_of_tests(self.tests), (test.curves[0].warnings for test in self.tests), strict=True)
+        return tuple(merged(dict(of_tests), everyone="all tests"))
+
+    def labelled(self, **labels: str | int | tuple[ResultWarning, ...]) -> Experiment:
         """Return the same measurements with other labels of `Curve`, such as name, source, unit to read or specimen."""
         return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # by name
 
@@ -415,4 +422,11 @@ class Experiment:
         stretch, stress, error = map(np.concatenate, zip(*columns, strict=True))
         labels = {name: getattr(self, name) for name in ("name", "source", "specimen", "direction", "condition")}
         joined = Experiment(self.mode, stretch, stress, standard_error=error, least_errors=self.least_errors)
-        return joined.labelled(stress_unit=self.stress_unit, averaged=averaged, **labels)
+        warnings = (*self.warnings, *experiment.warnings)
+        return joined.labelled(stress_unit=self.stress_unit, averaged=averaged, warnings=warnings, **labels)
+
+
+def labels_of_tests(tests: Sequence[Experiment]) -> list[str]:
+    """Return the names of tests, those of the same name numbered by their places among all."""
+    names = [test.name for test in tests]
+    return [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]

@@ -26,6 +26,7 @@ from tissuq.model.tolerances import FittedErrors, Tolerances
 from tissuq.parameters.priors import prior_from
 from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
 from tissuq.posterior.solver import Solver
+from tissuq.result_warning import ResultWarning, Severity
 
 T = TypeVar("T", Material, Discrepancy)
 
@@ -74,6 +75,7 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
                 "mode": test.mode.name,
                 "least_errors": json.dumps(test.least_errors),
                 "averaged": test.curves[0].averaged,
+                "warnings": json.dumps([_plain_warning(warning) for warning in test.curves[0].warnings]),
             }
             | {label: getattr(test, label) for label in LABELS},
         )
@@ -169,7 +171,18 @@ def _test(group: Group) -> Experiment:
         "standard_error": group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T,
         "least_errors": json.loads(group.attrs.get("least_errors", "{}")),
     }
-    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(averaged=averaged, **labels)
+    warnings = tuple(_warning(**plain) for plain in json.loads(group.attrs.get("warnings", "[]")))
+    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(
+        averaged=averaged, warnings=warnings, **labels
+    )
+
+
+def _plain_warning(warning: ResultWarning) -> dict[str, str]:
+    return {"shell": warning.shell, "python": warning, "code": warning.code, "severity": warning.severity}
+
+
+def _warning(shell: str, python: str, code: str, severity: str) -> ResultWarning:
+    return ResultWarning(shell, code, Severity(severity)).in_python(python)
 
 
 def _plain_noise(noise: Noise) -> str | float | list[float]:

@@ -152,12 +152,8 @@ class Posterior(PosteriorPlots):
         predict other loading modes - with care
         simulate with finite elements - with care
         """
-        return self.answer_with(())
-
-    def answer_with(self, warnings: Sequence[ResultWarning]) -> Answer:
-        """Return `answer` where more is known that was implausible, such as of the file."""
         of_test = measurement_warnings(self.model.experiment) if self.solution.is_of_data else ()
-        all_warnings = most_severe_first([*warnings, *self.warnings, *of_test])
+        all_warnings = most_severe_first([*of_test, *self.warnings])
         return answer_of(self.solution, self.stable_ranges, all_warnings, self._is_inside)
 
     def assess(self) -> Assessment:

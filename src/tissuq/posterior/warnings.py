@@ -10,11 +10,12 @@ from scipy.special import bdtr
 
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.extent import has_energy
-from tissuq.assessment.measurements import falls, labels_of_tests, stresses_apart
+from tissuq.assessment.measurements import falls, stresses_apart
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.separability import inseparable_parameters
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
+from tissuq.experiments.experiment import labels_of_tests
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ScaleError, TestError

@@ -62,7 +62,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     )
     law, names = study.recommended, list(comparison.fits)
     laws = " and ".join([", ".join(names[:-1]), names[-1]])
-    answer = comparison.fits[law].answer_with(study.data_warnings)
+    answer = comparison.fits[law].answer
     return Result(
         command=f"fit{inputs.options}",
         title=f"{named(study.experiment)}: which law of {laws if len(names) <= FEW_LAWS else len(names)}",

@@ -130,11 +130,12 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
 
         return {self.material: own.get(self.material) or material_named(self.material)}
 
-    def experiment(self, folder: Path = Path()) -> Experiment:
-        """Read the measurements, of all tests together."""
+    def experiment(self, folder: Path = Path(), found: Sequence[Reading | None] = ()) -> Experiment:
+        """Read the measurements, of all tests together, unless they are found."""
         from tissuq.experiments.experiment import Experiment
+        from tissuq.experiments.reading.findings import experiment_of
 
-        return Experiment.of([reading.experiment for reading in self.readings(folder)])
+        return Experiment.of(list(map(experiment_of, self.readings(folder, found))))
 
     def noise_in(self, unit: StressUnit) -> Noise:
         """Return the noise, known standard deviations converted from a unit to MPa."""

@@ -20,7 +20,7 @@ from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
 from tissuq.studies.fit_settings import LawSettings
-from tissuq.studies.specimen import priors_in_mpa, shared_options, warnings_of_files
+from tissuq.studies.specimen import priors_in_mpa, shared_options
 from tissuq.studies.stream import open_pool
 
 SIGNIFICANT_ERRORS = 2.0
@@ -38,14 +38,11 @@ class LawStudy:
     settings : LawSettings
     experiment : Experiment
     comparison : LawComparison
-    data_warnings : tuple of ResultWarning
-        What is implausible in the measurements.
     """
 
     settings: LawSettings
     experiment: Experiment
     comparison: LawComparison
-    data_warnings: tuple[ResultWarning, ...] = ()
 
     @property
     def unit(self) -> StressUnit:
@@ -98,9 +95,8 @@ class LawStudy:
             *of_recommended,
             *(text if text.severity is Severity.PROBLEM else text.as_note() for text in of_others),
         ]
-        return most_severe_first(
-            [*self.data_warnings, *self.comparison.warnings_of_evidence, *measurement_warnings(self.experiment), *texts]
-        )
+        of_data = measurement_warnings(self.experiment)
+        return most_severe_first([*of_data, *self.comparison.warnings_of_evidence, *texts])
 
 
 def run_laws(
@@ -125,8 +121,7 @@ def run_laws(
     InputError, ModelError, ConvergenceError
         When file or settings cannot be used, or a law that was named cannot be fitted.
     """
-    readings = settings.readings(folder, found)
-    experiment = Experiment.of([reading.experiment for reading in readings])
+    experiment = settings.experiment(folder, found)
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
     laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
     one_a_core = 1 if len(laws) < MIN_DIVIDED else os.cpu_count() or 1
@@ -142,7 +137,7 @@ def run_laws(
             **shared_options(settings, unit),
         )
     fitted_experiment = next(iter(comparison.fits.values())).model.experiment
-    return LawStudy(settings, fitted_experiment, comparison, warnings_of_files(readings))
+    return LawStudy(settings, fitted_experiment, comparison)
 
 
 @contextmanager

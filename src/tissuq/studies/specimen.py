@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -13,12 +12,10 @@ from typing import TYPE_CHECKING, Any
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.assessment.answer import Answer
 from tissuq.assessment.evidence import warnings_of_evidence
-from tissuq.assessment.measurements import labels_of_tests
 from tissuq.assessment.stability import measured_states
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import (
@@ -53,8 +50,6 @@ class SpecimenStudy:
     seconds: dict[str, float]
     skipped: dict[str, str]
     assessments: dict[str, Assessment]
-    data_warnings: tuple[ResultWarning, ...] = ()
-    """What is implausible in the measurements."""
     held_out: tuple[dict[str, Any], ...] = ()
     """How each test is predicted from the others, if requested."""
 
@@ -79,17 +74,17 @@ class SpecimenStudy:
         )
         of_comparison = [warning.as_note() for warning in of_evidence]
         of_data = measurement_warnings(self.experiment)
-        return most_severe_first([*self.data_warnings, *of_main, *of_data, *of_comparison, *beside])
+        return most_severe_first([*of_data, *of_main, *of_comparison, *beside])
 
     @property
     def main(self) -> str:
         """The discrepancy whose posterior answers: the one that decides from the data, or the first."""
         return Auto.name if Auto.name in self.posteriors else next(iter(self.posteriors))
 
-    @cached_property
+    @property
     def answer(self) -> Answer:
-        """The answer of the main posterior, with what is implausible in the measurements taken into account."""
-        return self.posteriors[self.main].answer_with(self.data_warnings)
+        """The answer of the main posterior."""
+        return self.posteriors[self.main].answer
 
     @property
     def headline(self) -> str:
@@ -132,8 +127,7 @@ def run_specimen(
         When file or settings cannot be used. A discrepancy that cannot be fitted is an error when it was named, and
         is skipped with the reason when all were asked for.
     """
-    readings = settings.readings(folder, found)
-    experiment = Experiment.of([reading.experiment for reading in readings])
+    experiment = settings.experiment(folder, found)
     (material,) = settings.fitted_laws({settings.material: law} if law else {}).values()
     unit = stress_unit(experiment.stress_unit)
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
@@ -161,7 +155,7 @@ def run_specimen(
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
     experiment = next(iter(posteriors.values())).model.experiment
-    study = SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {}, warnings_of_files(readings))
+    study = SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {})
     early(study)
     step("assessing")
     assessments = {
@@ -230,13 +224,6 @@ def shared_options(settings: SpecimenSettings, unit: StressUnit) -> dict[str, An
     """Return the options of a fit that do not depend on material and discrepancy."""
     stated = {name: getattr(settings, name) for name in ("method", "stable_in", "seed")}
     return {"noise": settings.noise_in(unit), "tolerances": settings.tolerances_in(unit), **stated}
-
-
-def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:
-    """Return the warnings about the files, each once, with the names of its tests if there are several."""
-    names = labels_of_tests([reading.experiment for reading in readings])
-    of_tests = zip(names, map(data_warnings, readings), strict=True)
-    return tuple(merged(dict(of_tests), everyone="all tests"))
 
 
 def _names(settings: SpecimenSettings) -> list[str]:

@@ -11,6 +11,7 @@ from numpy.polynomial import Polynomial
 
 from tissuq.arrays import FloatArray
 from tissuq.experiments.checked_arrays import LARGE_STRETCH
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Biaxial, Uniaxial
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.axial_stretch import note_of_stretched_tube
@@ -19,6 +20,7 @@ from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import Cycle, labelled
 from tissuq.experiments.reading.plausibility import LEAST_STRAIN, STANDARD_ERRORS, poisson_ratio, readable_shares
+from tissuq.experiments.reading.python_form import in_python
 from tissuq.experiments.reading.rows_of_tests import advice_on_numbered_tests, jump
 from tissuq.experiments.reading.side_by_side import test_beside
 from tissuq.experiments.reading.slack import Slack
@@ -87,9 +89,11 @@ def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
     return tuple(warnings)
 
 
-def cautions(reading: Reading) -> list[str]:
-    """Return those of `data_warnings` that matter for the numbers, of which Python warns when it reads."""
-    return [warning for warning in data_warnings(reading) if warning.severity is not Severity.NOTE]
+def experiment_of(reading: Reading) -> Experiment:
+    """Return what was read as an experiment that keeps its `data_warnings`, in the forms of Python and the shell."""
+    experiment = reading.experiment
+    warnings = (warning.in_python(in_python(warning, experiment.stress_unit)) for warning in data_warnings(reading))
+    return experiment.labelled(warnings=tuple(warnings))
 
 
 def _size(reading: Reading, number: int) -> str:

@@ -7,9 +7,10 @@ from typing import Any, Unpack
 
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import read_file
-from tissuq.experiments.reading.findings import cautions
+from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.reading.options import PythonOptions
-from tissuq.experiments.reading.python_form import in_python, refusals_worded_for
+from tissuq.experiments.reading.python_form import refusals_worded_for
+from tissuq.result_warning import Severity
 
 
 def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
@@ -155,9 +156,11 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     """
     with refusals_worded_for(path):
         reading = read_file(path, **options)
-    for text in cautions(reading):
-        warnings.warn(in_python(text, reading.experiment.stress_unit), stacklevel=2)
-    return reading.experiment
+    experiment = experiment_of(reading)
+    for warning in experiment.curves[0].warnings:
+        if warning.severity is not Severity.NOTE:
+            warnings.warn(warning, stacklevel=2)
+    return experiment
 
 
 read_experiment = read

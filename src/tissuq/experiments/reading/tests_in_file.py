@@ -20,16 +20,17 @@ from tissuq.experiments.reading.column_checks import check_machine, check_sectio
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
-from tissuq.experiments.reading.findings import cautions
+from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.python_form import in_python, refusals_worded_for
+from tissuq.experiments.reading.python_form import refusals_worded_for
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_tables
+from tissuq.result_warning import Severity
 
 MIN_SHARE_OF_TEST = 0.5
 """Rows of a table that may be a test, over those of the longest test in its file; shorter ones are of results."""
@@ -90,13 +91,15 @@ def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False)
     with refusals_worded_for(path):
         plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
         tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
+    experiments = [experiment_of(test.reading) for test in tests]
     names_of_text = dict[str, list[str]]()
-    for test in tests:
-        for text in dict.fromkeys(cautions(test.reading)):
-            names_of_text.setdefault(in_python(text, test.reading.experiment.stress_unit), []).append(test.name)
+    for test, experiment in zip(tests, experiments, strict=True):
+        for warning in dict.fromkeys(experiment.curves[0].warnings):
+            if warning.severity is not Severity.NOTE:
+                names_of_text.setdefault(warning, []).append(test.name)
     for text, names in names_of_text.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=3)
-    return [test.reading.experiment for test in tests]
+    return experiments
 
 
 def _is_read(data: Any) -> bool:
