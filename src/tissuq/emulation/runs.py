@@ -134,16 +134,24 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     except UnreadableError:
         raise
     except Exception as error:  # a failed run is a result, which is listed
-        missing = {*error.args} - {*dict(run.parameters)} if isinstance(error, KeyError) else set()
-        taken = f"; {', '.join(map(str, missing))} is of the discrepancy or the noise: give the model's another name"
-        there_are = f"there are priors of {', '.join(dict(run.parameters))}{taken * bool(missing & ERROR_SYMBOLS)}"
-        what_to_do = f" ({there_are})" * bool(missing)
-        result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300] + what_to_do
+        first_line = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
+        result["error"] = first_line + _without_prior(error, dict(run.parameters))
     else:
         result |= _checked(outputs, run)
         if not result["error"]:
             run.forward.clear(dict(run.parameters))
     return result | {"parameters": dict(run.parameters), "seconds": perf_counter() - start}
+
+
+def _without_prior(error: Exception, parameters: Mapping[str, float]) -> str:
+    """Return which priors there are, where a model asked for a parameter that has none; else nothing."""
+    if not isinstance(error, KeyError) or not (missing := {*error.args} - {*parameters}):
+        return ""
+    taken = "".join(
+        f"; {symbol} is of the discrepancy or the noise: give the model's another name"
+        for symbol in missing & ERROR_SYMBOLS
+    )
+    return f" (there are priors of {', '.join(parameters)}{taken})"
 
 
 def _checked(outputs: Any, run: ForwardRun) -> dict[str, Any]:

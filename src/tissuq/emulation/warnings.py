@@ -165,8 +165,8 @@ def _no_parameters_fit(
     at_draws = likelihood.misfits(draws)
     of_discrepancy = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
     misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, of_discrepancy])).min())
-    is_out = (measured < outputs.min(axis=0)) | (measured > outputs.max(axis=0))
-    is_out_of_reach = _is_out_of_reach(problem, outputs)
+    beyond = np.maximum(outputs.min(axis=0) - measured, measured - outputs.max(axis=0))
+    is_out_of_reach = _is_out_of_reach(problem, beyond, np.ptp(outputs, axis=0))
     predicted = likelihood.predictions(draws, discrepancy=False, noise=False)[0]
     is_noise = _noise_is_misfit(problem, np.vstack([outputs, predicted]))
     if gammaincc(0.5 * size, 0.5 * misfit) > MIN_MISFIT_PROBABILITY and not is_out_of_reach and not is_noise:
@@ -192,7 +192,7 @@ def _no_parameters_fit(
         + f"Of {len(points)} runs the nearest ({', '.join(named)}) is off "
         f"by {off:.3g}{f' in {name}' if name else ''} (root mean square), most at the control "
         f"{problem.control[worst]:.4g}: measured {measured[worst]:.4g}, model {outputs[nearest, worst]:.4g}. "
-        f"{is_out.sum()} of {size} measurements are "
+        f"{(beyond > 0).sum()} of {size} measurements are "
         "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
         "model (discrepancy gp-pinned).",
         "unmodelled-curve",
@@ -200,18 +200,17 @@ def _no_parameters_fit(
     )
 
 
-def _is_out_of_reach(problem: Problem, outputs: FloatArray) -> bool:
-    """Return whether so many measurements are beyond all outputs (N, n) that what is unknown takes up a wrong model.
+def _is_out_of_reach(problem: Problem, beyond: FloatArray, widths: FloatArray) -> bool:
+    """Return whether what is unknown takes up a wrong model, by how far measurements (n,) are beyond all outputs.
 
-    A process that is pinned does so where all in the half of a quantity nearest to zero load, which it changes least,
-    are beyond the outputs by more than these differ.
+    Outputs differ by ``widths`` (n,). A free process or an unknown noise does so where most are beyond; one that is
+    pinned where all in the half of a quantity nearest to zero load, which it changes least, are beyond by more than the
+    outputs differ.
     """
-    low, high = outputs.min(axis=0), outputs.max(axis=0)
-    beyond = np.maximum(low - problem.measured, problem.measured - high)
     if isinstance(problem.discrepancy, PinnedProcess):
         distance = np.abs(problem.control - problem.discrepancy.references[0])
         ends = [slice(*quantity) for quantity in problem.quantities.values()]
-        return any((beyond > high - low)[of][distance[of] <= np.median(distance[of])].all() for of in ends)
+        return any((beyond > widths)[of][distance[of] <= np.median(distance[of])].all() for of in ends)
     is_absorbed = problem.discrepancy.is_correlated or None in problem.noise_sd.values()
     return bool(is_absorbed and (beyond > 0).mean() > MAX_SHARE_OUT_OF_REACH)
 
