@@ -6,12 +6,16 @@ import csv
 import json
 import re
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import tissuq as tq
+from tissuq.experiments.reading.findings import experiment_of
+from tissuq.population.warnings import warnings_of_tests
+from tissuq.result_warning import merged
 from tissuq.studies import population
 from tissuq.studies.population import PopulationSettings
 
@@ -253,8 +257,12 @@ def test_warnings_about_files_are_told_with_their_specimens(here):
     """The short version, without a fit."""
     write_units(here)
     readings = PopulationSettings(files=("S0.csv", "S1.csv", "S2.csv")).readings()
-    told = population._in_few(population._data_warnings(readings))
-    assert any(text.startswith(UNITS_ASSUMED) for text in told)
+    fits = {
+        name: SimpleNamespace(model=SimpleNamespace(experiment=tq.Experiment.of([*map(experiment_of, of_one)])))
+        for name, of_one in readings.items()
+    }
+    warnings = merged(warnings_of_tests(SimpleNamespace(posteriors=fits)))
+    assert any(text.startswith(UNITS_ASSUMED) for text in warnings)
 
 
 def test_files_that_name_the_same_specimen_are_tests_of_it(here):

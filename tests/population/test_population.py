@@ -470,9 +470,17 @@ def test_specimens_that_were_hardly_deformed_are_refused_by_name():
         tq.fit_population(specimens)
 
 
+def model_of_tests(*warnings):
+    """Return a model of tests with these warnings."""
+    return SimpleNamespace(experiment=SimpleNamespace(warnings=warnings))
+
+
 def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     moduli = {"a": 1.0, "b": 1.2, "c": 0.9, "soft": 0.005}
-    fits = {name: SimpleNamespace(initial_shear_modulus=SimpleNamespace(mean=value)) for name, value in moduli.items()}
+    fits = {
+        name: SimpleNamespace(initial_shear_modulus=SimpleNamespace(mean=value), model=model_of_tests())
+        for name, value in moduli.items()
+    }
     population = SimpleNamespace(
         posteriors=fits, converged=True, symbols=("C10",), coordinates=SimpleNamespace(is_log=[True]),
         summary=lambda: {"median": {("C10", "spread"): 0.3}},
@@ -483,32 +491,36 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert warning.severity == Severity.PROBLEM
     assert "the initial modulus of soft is 0.0053 times that of the other specimens" in warning
     of = partial(PopulationAnswer, ())
-    assert next_step_of(population, [], of(())).startswith("look at soft first")
+    assert next_step_of(population, of(())).startswith("look at soft first")
     without_unit = ResultWarning("the unit of the stress is not stated.", "doubtful-reading", Severity.PROBLEM)
-    assert next_step_of(population, [without_unit], of(())).startswith("say what the files do not")
+    fits["soft"].model = model_of_tests(without_unit)
+    assert next_step_of(population, of(())).startswith("say what the files do not")
     population.posteriors.pop("soft")
-    assert "finite elements" in next_step_of(population, [], of((), share=0.2))
-    assert next_step_of(population, [], of((), share=0.3)).startswith("fit another law (--material) before you compute")
+    assert "finite elements" in next_step_of(population, of((), share=0.2))
+    assert next_step_of(population, of((), share=0.3)).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
-    assert "--aim 20%" in next_step_of(population, [], of(useless))
-    assert next_step_of(population, [], of(useless), has_aim=True).startswith("find out what sets the specimens apart")
-    assert next_step_of(population, [], of(useless, share=0.3), has_aim=True).startswith("fit another law")
+    assert "--aim 20%" in next_step_of(population, of(useless))
+    assert next_step_of(population, of(useless), has_aim=True).startswith("find out what sets the specimens apart")
+    assert next_step_of(population, of(useless, share=0.3), has_aim=True).startswith("fit another law")
     not_predicted = [Use(PREDICTING, Verdict.NO, NOT_PREDICTED)]
-    assert "finite elements" in next_step_of(population, [], of(not_predicted))
+    assert "finite elements" in next_step_of(population, of(not_predicted))
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
-    assert next_step_of(population, [at_rest], of(useless)).startswith("take off what the load cell shows at rest")
-    said = next_step_of(population, [at_rest], of(useless), ["d"], at_rest=["a"])
+    fits["a"].model = model_of_tests(at_rest)
+    said = next_step_of(population, of(useless), ["d"])
     assert said.startswith("take off what the load cell shows at rest in a, as the warning about it says")
     assert said.endswith("or leave it out: --without d --without a")
+    fits["b"].model = model_of_tests(at_rest)
+    assert next_step_of(population, of(useless)).startswith("take off what the load cell shows at rest, as the warning")
+    fits["a"].model = fits["b"].model = model_of_tests()
     apart, departing = ([Use(PREDICTING, Verdict.NO, reason)] for reason in (CONTRADICTING, DEPARTING))
-    assert next_step_of(population, [], of(apart)).startswith("find out why the tests of a specimen contradict")
-    assert next_step_of(population, [], of(departing)).endswith("--discrepancy auto")
+    assert next_step_of(population, of(apart)).startswith("find out why the tests of a specimen contradict")
+    assert next_step_of(population, of(departing)).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = True
-    assert next_step_of(population, [], of(useless)).endswith("--discrepancy auto")
+    assert next_step_of(population, of(useless)).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = False
-    assert next_step_of(population, [], of(useless, share=0.3)).startswith("fit another law")
+    assert next_step_of(population, of(useless, share=0.3)).startswith("fit another law")
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
-    assert next_step_of(population, [], of(())).startswith("find out why the specimens differ so much")
+    assert next_step_of(population, of(())).startswith("find out why the specimens differ so much")
 
 
 def test_what_leaves_the_discrepancy_out_serves_where_that_carries_little():
@@ -534,11 +546,16 @@ def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_tha
     monkeypatch.setattr(answer, "shares_of_discrepancy", lambda share: (share, None))
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
 
-    def said(shares, warnings=(), **which):
-        fits = {name: SimpleNamespace(solution=Share(share)) for name, share in zip("abc", shares, strict=True)}
+    def said(shares, warnings=()):
+        fits = {
+            name: SimpleNamespace(
+                solution=Share(share), model=model_of_tests(*warnings) if name == "a" else model_of_tests()
+            )
+            for name, share in zip("abc", shares, strict=True)
+        }
         law = SimpleNamespace(model=SimpleNamespace(material=SimpleNamespace(name="demiray")))
         pooled = SimpleNamespace(posteriors=fits, complete=law)
-        return answer.about_law(pooled, answer.share_of_discrepancy(pooled, warnings, **which))
+        return answer.about_law(pooled, answer.share_of_discrepancy(pooled))
 
     class Share(tuple):
         model = None
@@ -546,7 +563,6 @@ def test_a_population_says_how_far_the_law_alone_is_from_its_specimens_where_tha
     clear = [(0.1, 0.0, 0.2), (0.4, 0.3, 0.5), (0.6, 0.4, 0.8)]
     assert "demiray alone is wrong here: the discrepancy carries 40 % of the stress" in said(clear)
     assert said(clear).endswith("cards of a new specimen are of demiray alone.")
-    assert said(clear, [at_rest]) == ""
-    assert "carries 50 % of the stress" in said(clear, [at_rest], at_rest=["a"])
+    assert "carries 50 % of the stress" in said(clear, [at_rest])
     assert said([(0.1, 0.0, 0.2)] * 2 + clear[2:]) == ""
     assert said([(0.9, 0.3, 1.5)] * 2 + clear[2:]) == ""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+import tissuq.population.warnings as of_population
 from tissuq.assessment.uses import Verdict
 from tissuq.population.uses import CONTRADICTING, DEPARTING, uses_of_population
 from tissuq.prediction.bands import Band
@@ -36,11 +37,17 @@ def band(half_width):
     return Band(STRETCH, median, median - half_width * abs(median), median + half_width * abs(median))
 
 
+def warn_of(monkeypatch, names, warning):
+    """Let the tests of these specimens have a warning."""
+    monkeypatch.setattr(of_population, "warnings_of_tests", lambda _: dict.fromkeys(names, (warning,)))
+    monkeypatch.setattr("tissuq.population.uses.warnings_of_tests", of_population.warnings_of_tests)
+
+
 def test_the_modulus_of_a_tissue_is_reported_as_its_median_is_known(alike):
     row = alike.summary(unit="MPa").loc[("C10", "median")]
     half_width = float(row["hdi_high"] - row["hdi_low"]) / 2 / float(row["median"])
     assert half_width < 0.2
-    reporting, _ = uses_of_population(alike, [band(0.1)], ())
+    reporting, _ = uses_of_population(alike, [band(0.1)])
     assert reporting.purpose == "report the modulus of the tissue"
     assert reporting.verdict is Verdict.CARE  # without a discrepancy
     assert f"known to ± {100 * half_width:.2g} %" in reporting.reason
@@ -49,7 +56,7 @@ def test_the_modulus_of_a_tissue_is_reported_as_its_median_is_known(alike):
 
 @pytest.mark.parametrize(("width", "verdict"), [(0.15, Verdict.CARE), (0.45, Verdict.CARE), (0.55, Verdict.NO)])
 def test_a_new_specimen_is_predicted_as_its_stress_is_known(alike, width, verdict):
-    _, predicting = uses_of_population(alike, [band(0.05), band(width)], ())
+    _, predicting = uses_of_population(alike, [band(0.05), band(width)])
     assert predicting.purpose == "predict a new specimen"
     assert predicting.verdict is verdict
     assert f"its stress known to ± {100 * width:.0f} %" in predicting.reason
@@ -59,35 +66,38 @@ def test_with_a_discrepancy_both_can_be_yes(monkeypatch):
     found = population(MODULI, "constant")
     carried = [0.1, 0.0, 0.2]
     monkeypatch.setattr("tissuq.population.uses.shares_of_discrepancy", lambda _: ((0, 0, 0), carried))
-    assert [use.verdict for use in uses_of_population(found, [band(0.15)], ())] == [Verdict.YES, Verdict.YES]
+    assert [use.verdict for use in uses_of_population(found, [band(0.15)])] == [Verdict.YES, Verdict.YES]
     carried[0] = 0.3
-    reporting, predicting = uses_of_population(found, [band(0.15)], ())
+    reporting, predicting = uses_of_population(found, [band(0.15)])
     assert (reporting.verdict, predicting.verdict) == (Verdict.NO, Verdict.YES)
     assert "carries 30 % of the initial stiffness" in reporting.reason
 
 
 @pytest.mark.parametrize("code", ["doubtful-reading", "stress-at-rest"])
-def test_what_is_wrong_with_measurements_stands_against_both(alike, code):
-    uses = uses_of_population(alike, [band(0.1)], (ResultWarning("x", code),))
+def test_what_is_wrong_with_measurements_stands_against_both(alike, code, monkeypatch):
+    warn_of(monkeypatch, alike.names, ResultWarning("x", code))
+    uses = uses_of_population(alike, [band(0.1)])
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
 
 
-AT_REST = ResultWarning("s0: there is stress.", "stress-at-rest")
+AT_REST = ResultWarning("there is stress.", "stress-at-rest")
 
 
 def test_stress_at_rest_in_few_specimens_calls_for_care_where_it_hardly_moves_the_tissue(alike, monkeypatch):
-    uses = uses_of_population(alike, [band(0.1)], (AT_REST,), at_rest=("s0",))
+    warn_of(monkeypatch, ["s0"], AT_REST)
+    uses = uses_of_population(alike, [band(0.1)])
     assert [use.verdict for use in uses] == [Verdict.CARE, Verdict.CARE]
     assert all(use.reason.endswith("; there is stress at rest in s0") for use in uses)
     assert "known to ±" in uses[0].reason
     monkeypatch.setattr("tissuq.population.uses._half_width", lambda _: 0.01)  # s0 is 17 % softer than the others
-    uses = uses_of_population(alike, [band(0.1)], (AT_REST,), at_rest=("s0",))
+    uses = uses_of_population(alike, [band(0.1)])
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
     assert uses[0].reason.startswith("there is stress at rest in s0, so that moduli may be off")
 
 
-def test_stress_at_rest_in_half_of_the_specimens_stands_against_both(alike):
-    uses = uses_of_population(alike, [band(0.1)], (AT_REST,), at_rest=("s0", "s1", "s2"))
+def test_stress_at_rest_in_half_of_the_specimens_stands_against_both(alike, monkeypatch):
+    warn_of(monkeypatch, ["s0", "s1", "s2"], AT_REST)
+    uses = uses_of_population(alike, [band(0.1)])
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
 
 
@@ -96,15 +106,15 @@ def test_doubtful_measurements_of_a_specimen_call_for_care(monkeypatch, severity
     monkeypatch.setattr("tissuq.population.uses._reporting", lambda _: (Verdict.YES, "known"))
     monkeypatch.setattr("tissuq.population.uses._predicting", lambda *_: (Verdict.NO, "not known"))
     monkeypatch.setattr("tissuq.population.uses._reason_against", lambda *_: "")
-    slipped = ResultWarning("s1: it slipped.", severity=severity)
-    reporting, predicting = uses_of_population(None, [], ("a sentence", slipped))
+    warn_of(monkeypatch, ["s1"], ResultWarning("it slipped.", severity=severity))
+    reporting, predicting = uses_of_population(None, [])
     assert (reporting.verdict, predicting.verdict) == (Verdict.CARE if is_doubted else Verdict.YES, Verdict.NO)
     for use in (reporting, predicting):
         assert use.reason.endswith("; see the warning about the measurements") is is_doubted
 
 
 def test_what_is_not_predicted_is_not_used(alike):
-    assert uses_of_population(alike, [], ())[1].verdict is Verdict.NO
+    assert uses_of_population(alike, [])[1].verdict is Verdict.NO
 
 
 def test_a_population_is_of_no_use_where_the_fits_of_most_specimens_are_of_none(alike, monkeypatch):
@@ -114,11 +124,11 @@ def test_a_population_is_of_no_use_where_the_fits_of_most_specimens_are_of_none(
         return [ResultWarning("x", next(codes[name] for name in codes if alike.posteriors[name].solution is solution))]
 
     monkeypatch.setattr("tissuq.population.uses.warnings_about", warnings_about)
-    assert {use.reason for use in uses_of_population(alike, [band(0.1)], ())} == {DEPARTING}
+    assert {use.reason for use in uses_of_population(alike, [band(0.1)])} == {DEPARTING}
     codes |= dict.fromkeys(list(codes)[:4], "tests-apart")
-    assert {use.reason for use in uses_of_population(alike, [band(0.1)], ())} == {CONTRADICTING}
+    assert {use.reason for use in uses_of_population(alike, [band(0.1)])} == {CONTRADICTING}
     codes |= dict.fromkeys(list(codes)[:3], "poorly-determined")  # of six
-    assert all(use.verdict is Verdict.CARE for use in uses_of_population(alike, [band(0.1)], ()))
+    assert all(use.verdict is Verdict.CARE for use in uses_of_population(alike, [band(0.1)]))
 
 
 def test_curves_that_a_law_cannot_follow_stand_against_both():
@@ -127,16 +137,16 @@ def test_curves_that_a_law_cannot_follow_stand_against_both():
         f"s{place}": tq.simulate("ogden-1", {"mu1": mu, "alpha1": 12.0}, stretch, noise_sd=0.002, seed=place)
         for place, mu in enumerate([0.1, 0.11, 0.12, 0.1, 0.09, 0.11])
     }
-    uses = uses_of_population(tq.fit_population(tests, discrepancy="none"), [band(0.1)], ())
+    uses = uses_of_population(tq.fit_population(tests, discrepancy="none"), [band(0.1)])
     assert [(use.verdict, use.reason) for use in uses] == [(Verdict.NO, DEPARTING)] * 2
 
 
 def test_few_specimens_say_little_of_a_new_one_and_one_in_another_unit_of_none():
     few = population(MODULI[:3], "constant")
-    _, predicting = uses_of_population(few, [band(0.1)], ())
+    _, predicting = uses_of_population(few, [band(0.1)])
     assert predicting.verdict is Verdict.CARE
     assert "which 3 specimens determine no better than its prior" in predicting.reason
-    uses = uses_of_population(population([*MODULI[:5], 500.0]), [band(0.1)], ())
+    uses = uses_of_population(population([*MODULI[:5], 500.0]), [band(0.1)])
     assert [use.verdict for use in uses] == [Verdict.NO, Verdict.NO]
     assert "s5 differs from the others as much as by a mistaken unit" in uses[0].reason
 
@@ -155,6 +165,19 @@ def test_the_answer_in_python_has_the_numbers_of_the_summary_and_the_uses_of_the
     ]  # fmt: skip
     bands = alike.new_patient(np.linspace(0.8, 1.3, 41), unit="MPa")
     width = Band(*(bands[name].to_numpy(float) for name in ("stretch", "median", "low", "high")))
-    assert answer.uses[:2] == uses_of_population(alike, [width], alike.warnings)
+    assert answer.uses[:2] == uses_of_population(alike, [width])
     assert "modulus of a new specimen" in str(answer)
     assert "WITH CARE: report the modulus of the tissue: " in str(answer)
+
+
+def test_what_is_doubtful_in_files_stands_against_the_answer_in_python(tmp_path):
+    tests = {}
+    for place, modulus in enumerate(MODULI):
+        test = tq.simulate("neo-hookean", {"C10": modulus}, STRETCH, noise_sd=0.01, seed=place)
+        lines = [f"{stretch},{stress:.4f}" for stretch, stress in zip(STRETCH, test.stress, strict=True)]
+        (tmp_path / f"s{place}.csv").write_text("\n".join(["stretch,stress", *lines]) + "\n")
+        tests[f"s{place}"] = tq.read(tmp_path / f"s{place}.csv")
+    found = tq.fit_population(tests, discrepancy="none", noise_sd=0.01)
+    assert [use.verdict for use in found.answer.uses] == [Verdict.NO] * 3
+    assert "what was read of the files is doubtful" in found.answer.uses[0].reason
+    assert any(str(text).startswith("all specimens: check the unit") for text in found.warnings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import exp
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ from tissuq.population.draws import PopulationDraws
 from tissuq.population.patient import patient_band
 from tissuq.population.picture import numbers_of
 from tissuq.population.uses import NOT_PREDICTED, share_of_initial_stiffness, uses_of_population
+from tissuq.population.warnings import specimens_with
 from tissuq.prediction.bands import Band, asked_for
-from tissuq.result_warning import has_code
 
 MODULUS = "initial shear modulus"
 ENDS = ("hdi_low", "hdi_high")
@@ -72,12 +72,10 @@ class PopulationAnswer:
 
 def answer_of_population(
     population: PopulationDraws,
-    warnings: Sequence[str],
     shown: StressUnit | None = None,
     bands: Iterable[Band] | None = None,
-    at_rest: Sequence[str] = (),
 ) -> PopulationAnswer:
-    """Return the answer that a population with these warnings gives.
+    """Return the answer that a population gives.
 
     Parameters
     ----------
@@ -85,8 +83,6 @@ def answer_of_population(
         That of the estimates, unless it is that of the population.
     bands : iterable of Band, optional
         The stress of a new specimen where specimens were measured, where it is known already.
-    at_rest : sequence of str
-        The specimens with stress at rest, where it is known which.
     """
     words, times = headline(population)
     symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
@@ -104,9 +100,9 @@ def answer_of_population(
         estimate(f"{words}, median of the population{patient_in_words(population, {})}", "median", unit.name),
         estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
     )
-    share = share_of_discrepancy(population, warnings, at_rest)
+    share = share_of_discrepancy(population)
     known = [*(_bands(population) if bands is None else bands)]
-    uses = uses_of_population(population, known, warnings, "modulus" if words == MODULUS else words, at_rest)
+    uses = uses_of_population(population, known, "modulus" if words == MODULUS else words)
     law = about_law(population, share) + about_modulus(population, share, words)
     return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip(), share)
 
@@ -187,14 +183,13 @@ def about_modulus(population: PopulationDraws, share: float, words: str) -> str:
     return f" The modulus is that at rest, of which the discrepancy carries {100 * initial:.0f} %."
 
 
-def share_of_discrepancy(population: PopulationDraws, warnings: Sequence[str], at_rest: Sequence[str] = ()) -> float:
+def share_of_discrepancy(population: PopulationDraws) -> float:
     """Return the share of the stress that the discrepancy carries: the median of the specimens without stress at rest.
 
-    Zero where it is not known of most specimens, or which of them have stress at rest.
+    Zero where it is not known of most specimens.
     """
-    posteriors = population.posteriors
+    posteriors, at_rest = population.posteriors, specimens_with(population, "stress-at-rest")
     fits = [fit for name, fit in posteriors.items() if name not in at_rest and has_energy(fit.solution.model)]
     shares = [shares_of_discrepancy(fit.solution)[0] for fit in fits]
     known = [share for share, _, high in shares if high < 1]
-    is_known_where = bool(at_rest) or not has_code(warnings, "stress-at-rest")
-    return float(np.median(known)) if 2 * len(known) > len(posteriors) and is_known_where else 0.0
+    return float(np.median(known)) if 2 * len(known) > len(posteriors) else 0.0

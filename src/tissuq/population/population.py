@@ -104,7 +104,7 @@ class Population(PopulationDraws):
         >>> answer.estimates[0].name, [str(use.verdict) for use in answer.uses]
         ('initial shear modulus of a new specimen', ['with care', 'no', 'no'])
         """
-        return answer_of_population(self, self.warnings)
+        return answer_of_population(self)
 
     def specimen_summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
         """Return every specimen's parameters from its separate fit and within the population.

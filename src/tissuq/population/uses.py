@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -11,23 +12,29 @@ from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import PRECISE, Use, Verdict, precision_of, relative_half_width, worst_of
 from tissuq.population.draws import PopulationDraws
 from tissuq.population.picture import numbers_of
-from tissuq.population.warnings import far_specimens, has_converged, has_few_specimens
+from tissuq.population.warnings import (
+    far_specimens,
+    has_converged,
+    has_few_specimens,
+    specimens_with,
+    warnings_of_tests,
+)
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import Band
-from tissuq.result_warning import Severity, has_code
+from tissuq.result_warning import Severity
 
 PREDICTING = "predict a new specimen"
 NOT_PREDICTED = "its stress cannot be predicted in the modes that were measured; 'Stress of a new specimen' says why"
 CONTRADICTING = "the tests of most specimens contradict each other, so that moduli may be those of none of them"
+DOUBTFUL_MEASUREMENTS = {"measurements", "large-drift"}
+"""Codes of warnings about measurements beside which nothing is known for certain."""
 DEPARTING = "the fitted curves of most specimens depart from the measured ones, and the intervals do not include that"
 
 
 def uses_of_population(
     population: PopulationDraws,
     bands: Sequence[Band],
-    warnings: Sequence[str],
     quantity: str = "modulus",
-    at_rest: Sequence[str] = (),
 ) -> tuple[Use, ...]:
     """Return for what a population can be used, by the limits that hold for the fit of a specimen.
 
@@ -36,21 +43,16 @@ def uses_of_population(
     population : PopulationDraws
     bands : sequence of Band
         Of the stress of a new specimen, without noise, where specimens were measured; none where it is not predicted.
-    warnings : sequence of str
-        Those that the population carries, and those about its measurements.
     quantity : str
         What the first pooled parameter is, or stands for.
-    at_rest : sequence of str
-        The specimens with stress at rest, where it is known which of them have it: a few may leave the numbers of the
-        tissue as they are.
     """
-    against = _reason_against(population, warnings, at_rest)
+    against = _reason_against(population)
     purposes = (f"report the {quantity} of the tissue", PREDICTING)
     if against:
         return tuple(Use(purpose, Verdict.NO, against) for purpose in purposes)
     judged = (_reporting(population), _predicting(population, bands))
     return tuple(
-        Use(purpose, *_beside_measurements(warnings, at_rest, *verdict))
+        Use(purpose, *_beside_measurements(population, *verdict))
         for purpose, verdict in zip(purposes, judged, strict=True)
     )
 
@@ -61,15 +63,18 @@ def share_of_initial_stiffness(population: PopulationDraws) -> float:
     return float(np.median(shares))
 
 
-def _reason_against(population: PopulationDraws, warnings: Sequence[str], at_rest: Sequence[str]) -> str:
+def _reason_against(population: PopulationDraws) -> str:
     """Return what stands against any use; nothing where nothing does."""
     far = ", ".join(far_specimens(population))
+    at_rest = specimens_with(population, "stress-at-rest")
     reasons = {
         "sampling has not converged": not has_converged(population),
-        "what was read of the files is doubtful, as the warning says": has_code(warnings, "doubtful-reading"),
+        "what was read of the files is doubtful, as the warning says": bool(
+            specimens_with(population, "doubtful-reading")
+        ),
         f"{far} differs from the others as much as by a mistaken unit, as the warning says": bool(far),
         f"there is stress at rest{_of_few(population, at_rest)}, so that moduli may be off by far more than their "
-        "intervals": has_code(warnings, "stress-at-rest") and not _are_beside(population, at_rest),
+        "intervals": bool(at_rest) and not _are_beside(population, at_rest),
         "the discrepancy aims at the best fit, not at the parameters": (
             population.complete.model.discrepancy.is_best_fit
         ),
@@ -138,17 +143,18 @@ def _predicting(population: PopulationDraws, bands: Sequence[Band]) -> tuple[Ver
     return _beside_law(population, verdict, sentence)
 
 
-def _beside_measurements(
-    warnings: Sequence[str], at_rest: Sequence[str], verdict: Verdict, sentence: str
-) -> tuple[Verdict, str]:
-    """Return a verdict with the doubt that warnings about the measurements of specimens, notes aside, leave."""
-    if at_rest:
+def _beside_measurements(population: PopulationDraws, verdict: Verdict, sentence: str) -> tuple[Verdict, str]:
+    """Return a verdict with the doubt that warnings about the measurements of specimens, notes aside, leave.
+
+    Stress at rest in a few of them may leave the numbers of the tissue as they are.
+    """
+    if at_rest := specimens_with(population, "stress-at-rest"):
         verdict, sentence = (
             worst_of(verdict, Verdict.CARE),
             f"{sentence}; there is stress at rest in {', '.join(at_rest)}",
         )
-    about_measurements = [w for w in warnings if has_code([w], "measurements") or has_code([w], "large-drift")]
-    if any(getattr(w, "severity", None) is not Severity.NOTE for w in about_measurements):
+    warnings = chain.from_iterable(warnings_of_tests(population).values())
+    if any(w.code in DOUBTFUL_MEASUREMENTS and w.severity is not Severity.NOTE for w in warnings):
         return worst_of(verdict, Verdict.CARE), f"{sentence}; see the warning about the measurements"
     return verdict, sentence
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from statistics import median
 
 from tissuq.population.draws import PopulationDraws
-from tissuq.result_warning import ResultWarning, Severity
+from tissuq.result_warning import ResultWarning, Severity, has_code, merged, most_severe_first
 
 MIN_EFFECTIVE_SHARE = 0.5
 """Smallest share of draws that must remain effective when they are corrected."""
@@ -14,10 +14,12 @@ FAR_FACTOR = 50.0
 """Between the modulus of a specimen and that of the others, from which its unit may be wrong."""
 MIN_SPECIMENS_FOR_SPREAD = 5
 """Smallest number of specimens for which the prior of the spread has little influence."""
+MAX_WARNINGS_OF_TESTS = 8
+"""Number of different warnings about the measurements that are shown."""
 
 
 def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
-    """Return the warnings, in sentences."""
+    """Return the warnings, in sentences: about the population, and about the measurements of its specimens."""
     sentences = [*_equal_specimens(population), *_far_specimens(population)]
     if not population.hierarchy.diagnostics.converged:
         sentences.append(population.hierarchy.diagnostics.verdict)
@@ -42,7 +44,20 @@ def warnings_of(population: PopulationDraws) -> tuple[str, ...]:
         sentences.append(
             f"the new specimen is beyond the specimens: {', '.join(extrapolated)}. That effects go on so is assumed."
         )
-    return tuple(sentences)
+    of_tests = most_severe_first(merged(warnings_of_tests(population), everyone="all specimens"))
+    omitted = len(of_tests) - MAX_WARNINGS_OF_TESTS
+    more = [f"{omitted} more warnings about the data; see tissuq inspect FILE."] if omitted > 0 else []
+    return (*sentences, *of_tests[:MAX_WARNINGS_OF_TESTS], *more)
+
+
+def warnings_of_tests(population: PopulationDraws) -> Mapping[str, tuple[ResultWarning, ...]]:
+    """Return what was implausible when the tests of every specimen were read."""
+    return {name: fit.model.experiment.warnings for name, fit in population.posteriors.items()}
+
+
+def specimens_with(population: PopulationDraws, code: str) -> list[str]:
+    """Return the specimens with a warning of that code about their measurements."""
+    return [name for name, warnings in warnings_of_tests(population).items() if has_code(warnings, code)]
 
 
 def has_converged(population: PopulationDraws) -> bool:

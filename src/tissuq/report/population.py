@@ -115,7 +115,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     modes = ", ".join(mode.name for mode in study.modes)
     columns = ("stretch", "median", "low", "high")
     predicted = [Band(*(of_mode[name].to_numpy(float) for name in columns)) for of_mode, _ in bands.values()]
-    answer = answer_of_population(population, study.warnings, unit, predicted, study.at_rest)
+    answer = answer_of_population(population, unit, predicted)
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
@@ -123,9 +123,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         numbers=tuple(Number(*estimate) for estimate in answer.estimates),
         finding=" ".join(filter(None, (_lead(study, answer), answer.law))),
         uses=answer.uses,
-        next_step=next_step_of(
-            population, study.warnings, answer, settings.without, has_aim=needed is not None, at_rest=study.at_rest
-        ),
+        next_step=next_step_of(population, answer, settings.without, has_aim=needed is not None),
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),
@@ -136,7 +134,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
             *needed_table_of(study, needed),
         ),
         sections=_sections(study, answer, bands, not_predicted),
-        warnings=tuple(study.warnings),
+        warnings=population.warnings,
         files=files | copies | posterior_files({PATIENT: population.patient}),
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip

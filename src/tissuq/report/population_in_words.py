@@ -13,7 +13,7 @@ from tissuq.population.answer import PopulationAnswer
 from tissuq.population.draws import ALL_COVARIATES
 from tissuq.population.sample_size import MAX_SPECIMENS
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
-from tissuq.population.warnings import far_specimens
+from tissuq.population.warnings import far_specimens, specimens_with
 from tissuq.report.measured import (
     INTRODUCTION,
     LAW,
@@ -25,7 +25,6 @@ from tissuq.report.measured import (
 )
 from tissuq.report.result import Number, Section, Table
 from tissuq.report.tables import interval, percent
-from tissuq.result_warning import has_code
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -41,21 +40,18 @@ WIDE_SPREAD = 1.0
 
 def next_step_of(
     population: Population,
-    warnings: Sequence[str],
     answer: PopulationAnswer,
     already_without: Sequence[str] = (),
     *,
     has_aim: bool = False,
-    at_rest: Sequence[str] = (),
 ) -> str:
     """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
 
     With an aim, the page has the number that it takes.
-    ``at_rest`` are the specimens with stress at rest, where it is known which.
     """
     if not population.converged:
         return "sample again, with another --seed; see the first warning"
-    if has_code(warnings, "doubtful-reading"):
+    if specimens_with(population, "doubtful-reading"):
         return "say what the files do not, as the warning about what was read asks, and fit again"
     if far := list(far_specimens(population)):
         options = " ".join(f"--without {name}" for name in (*already_without, *far))
@@ -63,8 +59,8 @@ def next_step_of(
             f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
             f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
         )
-    if has_code(warnings, "stress-at-rest"):
-        if 0 < 2 * len(at_rest) < len(population.posteriors):
+    if at_rest := specimens_with(population, "stress-at-rest"):
+        if 2 * len(at_rest) < len(population.posteriors):
             options = " ".join(f"--without {name}" for name in (*already_without, *at_rest))
             return (
                 f"take off what the load cell shows at rest in {', '.join(at_rest)}, as the warning about it says, and "

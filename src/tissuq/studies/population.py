@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, cast
@@ -12,21 +11,16 @@ from typing import TYPE_CHECKING, cast
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
 from tissuq.population.covariates import covariates_of
 from tissuq.population.pooling import MIN_SPECIMENS
-from tissuq.result_warning import ResultWarning, has_code, merged, most_severe_first
 from tissuq.studies.fit_settings import PopulationSettings
 
 if TYPE_CHECKING:
     from tissuq.posterior.solver import Method
-
-MAX_DATA_WARNINGS = 8
-"""Number of different warnings about the data that are shown."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +31,6 @@ class PopulationStudy:
     tests: dict[str, list[Experiment]]
     population: Population
     seconds: float
-    data_warnings: tuple[str, ...] = ()
-    """What is implausible in the measurements."""
-    at_rest: tuple[str, ...] = ()
-    """Specimens with stress at rest."""
 
     @property
     def unit(self) -> StressUnit:
@@ -58,11 +48,6 @@ class PopulationStudy:
         """How many measurements there are of all specimens."""
         return sum(len(test) for tests in self.tests.values() for test in tests)
 
-    @property
-    def warnings(self) -> list[str]:
-        """Warnings about data and fit."""
-        return [*self.population.warnings, *self.data_warnings]
-
 
 def run_population(
     settings: PopulationSettings,
@@ -78,10 +63,7 @@ def run_population(
         When files or settings cannot be used.
     """
     step("reading")
-    readings = settings.readings(folder)
-    tests = {
-        name: [reading.experiment for reading in specimen_readings] for name, specimen_readings in readings.items()
-    }
+    tests = {name: [*map(experiment_of, readings)] for name, readings in settings.readings(folder).items()}
     if len(tests) < MIN_SPECIMENS:
         raise InputError(
             f"a population needs {MIN_SPECIMENS} specimens or more; there are {len(tests)} ({', '.join(tests)}). Give "
@@ -117,9 +99,7 @@ def run_population(
         method=cast("Method", settings.method),
         seed=settings.seed,
     ).given(settings.new_patient)
-    warnings = _data_warnings(readings)
-    at_rest = tuple(name for name, of_one in warnings.items() if has_code(of_one, "stress-at-rest"))
-    return PopulationStudy(settings, tests, population, perf_counter() - start, _in_few(warnings), at_rest)
+    return PopulationStudy(settings, tests, population, perf_counter() - start)
 
 
 def _units(tests: Mapping[str, Sequence[Experiment]]) -> set[str]:
@@ -129,18 +109,3 @@ def _units(tests: Mapping[str, Sequence[Experiment]]) -> set[str]:
 def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
     units = _units(tests)
     return stress_unit(units.pop() if len(units) == 1 else "MPa")
-
-
-def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> dict[str, list[ResultWarning]]:
-    """Return the warnings about the files of every specimen."""
-    return {name: list(chain.from_iterable(map(data_warnings, of_one))) for name, of_one in readings.items()}
-
-
-def _in_few(warnings: Mapping[str, Sequence[ResultWarning]]) -> tuple[str, ...]:
-    """Return the warnings about the files of specimens, each once with the specimens that it concerns."""
-    messages = most_severe_first(merged(warnings, everyone="all specimens"))
-    omitted = len(messages) - MAX_DATA_WARNINGS
-    return (
-        *messages[:MAX_DATA_WARNINGS],
-        *([f"{omitted} more warnings about the data; see tissuq inspect FILE."] if omitted > 0 else []),
-    )
