@@ -13,6 +13,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
 from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
@@ -99,6 +100,9 @@ def copied(folder: Path) -> Path:
 
 def main(words: list[str]) -> int:
     """Judge the faults whose text holds one of the words, or all."""
+    if find_spec("tissuq") is None:
+        print("tissuq is not installed for this Python, without which every test fails: use .venv/bin/python.")
+        return 1
     mutants = [mutant for mutant in MUTANTS if not words or any(word in " ".join(mutant) for word in words)]
     caught = 0
     for mutant, good, said in judged(mutants):
