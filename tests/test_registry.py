@@ -14,12 +14,14 @@ from tissuq.decks.result_file import ResultFile, Results
 from tissuq.experiments.modes import loading_mode
 from tissuq.experiments.modes.one_control import Uniaxial
 from tissuq.experiments.reading import FileFormat
+from tissuq.experiments.units import stress_unit
 from tissuq.export.cards import CardFormat, card_format
 from tissuq.finite_elements import Case, ClampedBar
 from tissuq.model.discrepancy import Constant, discrepancy_named
 from tissuq.model.measurement_errors import ZeroError
 from tissuq.model.noise import noise_named
 from tissuq.parameters.priors import prior_from
+from tissuq.studies.fit_settings import SpecimenSettings
 
 BASES = [
     tq.Material,
@@ -74,6 +76,7 @@ def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(pa
     vars(package).update(kinds)
     assert type(discrepancy_named("offset")) is kinds["offset"]
     assert type(noise_named("loud")) is kinds["loud"]
+    assert type(SpecimenSettings(file="a.csv", noise="loud").noise_in(stress_unit("kPa"))) is kinds["loud"]
     assert [type(error) for error, _ in tq.Tolerances(settling=0.1)] == [kinds["settling"]]
     assert type(loading_mode("upright")) is kinds["upright"]
     assert type(prior_from({"distribution": "box", "low": 0, "high": 1})) is kinds["box"]
@@ -116,7 +119,7 @@ def test_a_class_that_lacks_what_lists_show_is_refused_by_what_it_lacks(package)
 
 
 def test_an_unknown_name_is_still_refused_by_the_kind_that_was_meant(package):
-    with pytest.raises(tq.InputError, match="noise must be a positive number of MPa or one of"):
+    with pytest.raises(tq.InputError, match="there is no noise named"):
         noise_named("unkown")
     with pytest.raises(tq.ModelError, match="there is no discrepancy named 'constnt'"):
         discrepancy_named("constnt")

@@ -43,7 +43,7 @@ FIT = [
     (["SPECIMEN", "--noise", "2%"], ["noise: ", "grows with the stress", "'proportional'"]),
     (["SPECIMEN", "--noise-sd", "2%"], ["'2%'", "--noise proportional"]),
     (["SPECIMEN", "--noise", "5"], ["standard deviation", "--noise-sd 5 "]),
-    (["SPECIMEN", "--noise", "white"], ["noise", "'white'", "'proportional'", "'repeats'"]),
+    (["SPECIMEN", "--noise", "white"], ["noise: there is no noise named 'white'", "proportional, repeats"]),
     (["SPECIMEN", "--noise", "repeats", "--noise-sd", "1"], ["noise_sd or noise, not both", "1.0", "'repeats'"]),
     (["SPECIMEN", "--discrepancy", "none", "--method", "nuts", "--noise-sd", "1"], ["'nuts'", "nothing is left"]),
     (["SPECIMEN", "--seed", "-1"], ["seed", "-1"]),

@@ -18,7 +18,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.smoothing import scatter, smoothed
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
-from tissuq.registry import find, plugins, variants
+from tissuq.registry import plugins, variants
 
 MIN_SD_MPA, MAX_SD_MPA = 1e-150, 1e150
 """Known standard deviations whose squares can be computed lie between these."""
@@ -196,10 +196,24 @@ def noise_named(noise: Any) -> Noise:
         return KnownNoises(float(np.exp(np.log(sds).mean())), sds)
     if not isinstance(noise, str):
         return KnownNoise(noise)
-    options = [name for name, kind in variants(Noise).items() if not issubclass(kind, KnownNoise)]
-    if noise not in options and not plugins(Noise, noise):
-        raise InputError(f"noise must be a positive number of MPa or one of {', '.join(options)}; not '{noise}'.")
-    return find(Noise, "noise", noise, InputError)()
+    return unknown_noise_named(noise)
+
+
+def unknown_noise_named(name: str) -> Noise:
+    """Return the noise of unknown standard deviation of that name, of tissuq or of another package.
+
+    Raises
+    ------
+    InputError
+        When no noise has that name.
+    """
+    kinds = {kind.name: kind for kind in variants(Noise).values() if not issubclass(kind, KnownNoise)}
+    for kind in [kinds[name]] if name in kinds else plugins(Noise, name):
+        return kind()
+    raise InputError(
+        f"there is no noise named '{name}': choose one of {', '.join(kinds)}, or give a standard deviation, a positive "
+        "number, as noise_sd."
+    )
 
 
 def stress_level(experiment: Experiment) -> FloatArray:

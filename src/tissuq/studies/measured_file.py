@@ -182,7 +182,7 @@ class FittedSettings(Settings):
         takes=str,
         parse=sd_or_unknown,
     )
-    noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
+    noise: str | None = option(
         None,
         "Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
         "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again).",
@@ -224,6 +224,7 @@ class FittedSettings(Settings):
             )
         return value
 
+    _known_noise = field_validator("noise")(there_is("tissuq.model.noise:unknown_noise_named"))
     _known_estimand = field_validator("estimand")(there_is("tissuq.model.tolerances:Tolerances"))
 
     @model_validator(mode="after")
