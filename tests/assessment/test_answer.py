@@ -214,6 +214,12 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
     assert STEPS["unnamed specimens"] == answer.next_step
 
 
+def test_of_a_single_test_it_is_not_asked_whether_its_tests_are_of_one_specimen():
+    answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), tolerances="tissue").answer
+    assert answer.uses[0].reason.endswith("the assumed spread between specimens")
+    assert STEPS["specimens"] == answer.next_step
+
+
 @pytest.mark.slow
 def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
