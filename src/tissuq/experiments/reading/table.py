@@ -333,7 +333,7 @@ def rows_in(lines: str, numbers: Sequence[int], file: str) -> BoolArray:
     is_in = np.zeros(len(of_rows), dtype=bool)
     for span in str(lines).split(","):
         ends = span.split(":")
-        if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
+        if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends) or int(ends[0]) > int(ends[-1]):
             raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
         is_in_span = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
         if not is_in_span.any():
