@@ -214,6 +214,12 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
     assert STEPS["unnamed specimens"] == answer.next_step
 
 
+def test_of_a_single_test_it_is_not_asked_whether_its_tests_are_of_one_specimen():
+    answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), tolerances="tissue").answer
+    assert answer.uses[0].reason.endswith("the assumed spread between specimens")
+    assert STEPS["specimens"] == answer.next_step
+
+
 @pytest.mark.slow
 def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
@@ -423,3 +429,10 @@ def test_instability_is_mended_by_fibres_of_a_sheet_and_by_leaving_out_a_fall_of
 )  # fmt: skip
 def test_a_width_is_said_as_far_as_it_means_something(half_width, verdict, words):
     assert precision_of(half_width) == (verdict, words)
+
+
+def test_a_test_in_shear_is_not_asked_for_stretches():
+    data = tq.simulate("neo-hookean", {"C10": 1e-3}, np.linspace(0.02, 0.2, 13), 1e-3, mode="simple-shear", seed=1)
+    (poor,) = [w for w in tq.fit(data, discrepancy="none", noise_sd=1e-3).warnings if w.code == "poorly-determined"]
+    assert "nearer to rest" in poor
+    assert "stretch" not in poor

@@ -56,6 +56,15 @@ def test_tests_in_different_modes_are_not_compared(modes):
     assert told(two_tests(FALLING, modes=modes)) == []
 
 
+def test_a_posterior_warns_of_its_measurements():
+    tests = two_tests(FALLING)
+    posterior = tq.fit(tests, discrepancy="none")
+    (warning,) = told(tests)
+    assert warning in posterior.warnings
+    assert warning not in posterior.warnings_of_fit
+    assert "one-direction" in {warning.code for warning in posterior.warnings}
+
+
 def stretched(factor, end=2.0, name="test", noise=0.003, seed=0):
     stretch = np.linspace(1.0, end, 25)
     scatter = noise * np.random.default_rng(seed).standard_normal(25)

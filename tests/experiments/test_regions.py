@@ -176,6 +176,7 @@ def test_lines_to_leave_out_are_left_out_and_stated(inspected):
     ("lines", "words"),
     [
         ("3:x", "must be lines of the file such as 31,45:50, not '3:x'"),
+        ("20:10", "must be lines of the file such as 31,45:50, not '20:10'"),
         ("1", "there is no row to leave out in line 1; rows are in lines 2 to 122"),
         ("130:140", "there is no row to leave out in line 130:140"),
         ("2:122", "no row is left without lines 2:122"),

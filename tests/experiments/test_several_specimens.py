@@ -156,6 +156,16 @@ def test_a_value_that_is_not_there_is_refused_with_those_that_are(tmp_path):
         tq.read_experiment(path, only={"Speciman": "A"})
 
 
+def test_lines_to_leave_out_are_of_the_test_that_has_them(tmp_path):
+    path = written(tmp_path, "Specimen", "ABC")
+    path.write_text(path.read_text().replace("C,1.000000,", "C,1.000000,x"))  # a cell that is no number, in line 42
+    assert [len(test) for test in tq.read_tests(path, leave_out="42,30:31")] == [20, 18, 19]
+    assert len(tq.read_experiment(path, only={"Specimen": "B"}, leave_out="42,30:31")) == 18
+    assert tq.read_experiment(path, only={"Specimen": "A"}, leave_out="30:31").source.count("without") == 0
+    with pytest.raises(InputError, match="no row to leave out in line 62; rows are in lines 2 to 61"):
+        tq.read_tests(path, leave_out="62")
+
+
 @pytest.mark.parametrize("name", ["mode", "Loading mode", "test_mode"])
 @pytest.mark.parametrize("stated", ["equibiaxial", "Planar", "pure shear", "tension"])
 def test_a_column_of_the_loading_mode_says_it(tmp_path, name, stated):

@@ -51,6 +51,12 @@ def test_along_a_mode_the_table_has_the_stress_of_a_free_energy(auto):
     assert [row["file"] for row in cards.index] == list(cards.files)
 
 
+@pytest.mark.parametrize("unused", [{"law": "ogden", "order": 3}, {"bulk_modulus": 5.0}, {"poisson": 0.49}])
+def test_a_table_refuses_what_is_of_cards_alone(given, unused):
+    with pytest.raises(tq.InputError, match=f"--{next(iter(unused)).replace('_', '-')}"):
+        _only(given([("neo-hookean", [0.4])]), **unused)
+
+
 def _only(ensemble, **settings):
     (text,) = card_format("table").cards(ensemble, CardSettings(**settings)).files.values()
     return text

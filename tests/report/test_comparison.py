@@ -63,6 +63,12 @@ def test_what_is_far_below_is_told_at_the_edge(table):
     assert "-12345" in texts
 
 
+def test_a_fit_that_predicts_exactly_as_well_as_the_best_is_as_good(specimen_study):
+    fit = specimen_study.posteriors["yeoh"]
+    twice = comparison_result(tq.compare({"first": fit, "second": fit}), ["first", "second"], KPA)
+    assert twice.numbers[2].remark == "as good: second"
+
+
 def test_what_is_not_known_is_said(table):
     unknown = table.copy()
     names = ["log_evidence", "log_bayes_factor", "log_bayes_factor_low", "log_bayes_factor_high", "probability"]

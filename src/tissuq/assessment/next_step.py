@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from tissuq.assessment.measurements import falls
 from tissuq.assessment.shares import shares_of_discrepancy
-from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict
+from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict, may_be_of_one_specimen
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning, Severity, has_code
 
@@ -137,7 +137,7 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
         return STEPS["fibres"]
     if reporting is not Verdict.YES:
         if SPREAD in uses[0].reason:
-            return STEPS["specimens" if all(test.specimen for test in model.experiment.tests) else "unnamed specimens"]
+            return STEPS["unnamed specimens" if may_be_of_one_specimen(model.experiment) else "specimens"]
         is_law_wrong = model.material.is_isotropic and shares_of_discrepancy(solution)[0][0] > PRECISE
         return STEPS["law" if is_law_wrong else "design"]
     if predicting is not Verdict.YES and len(model.experiment.modes) == 1:

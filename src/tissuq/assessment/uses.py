@@ -81,6 +81,11 @@ def uses_of(
     )
 
 
+def may_be_of_one_specimen(experiment: Experiment) -> bool:
+    """Whether there are several tests, and not all say of which specimen they are."""
+    return len(experiment.tests) > 1 and not all(test.specimen for test in experiment.tests)
+
+
 def _reporting(
     solution: Solution,
     stiffness: Marginal,
@@ -134,7 +139,7 @@ def _reporting(
         names = " and ".join(f"'{error.name}'" for error, _ in model.tolerances if error.name in ("stress", "test"))
         error = f"assumed error of load and area (tolerance {names}, {100 * model.common_error:.0f} %)"
         unnamed = " (each test without the name of one counts as a specimen)"
-        spread = SPREAD + unnamed * (not all(test.specimen for test in model.experiment.tests))
+        spread = SPREAD + unnamed * may_be_of_one_specimen(model.experiment)
         common = spread if model.tolerances.estimand == TISSUE else error
         return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width + ", errors of the test not included" * (model.tolerances.estimand == AS_TESTED)

@@ -28,7 +28,8 @@ def predict(call: Call[PredictionSettings, OfRun]) -> None:
     call.check_source("run", "the RUN folder of a fit", "prediction")
     data = call.stated.get("data", {})
     if data and not ("file" in data or call.config):
-        raise InputError(f"{', '.join(data)} can only be used with --data FILE.")
+        typed = [words for path, words in call.typed.items() if path.startswith("data.")]
+        raise InputError(f"{', '.join(typed)} can only be used with --data FILE.")
     if "file" in data:
         data["file"] = str(resolve(data["file"]))
     settings, beside, law = call.settings, call.beside, call.law

@@ -41,6 +41,11 @@ class Table(CardFormat):
                 f"material '{ensemble[0].parts[0][0].name}' has fibres, and W1 and W2 do not tell its stress: write "
                 "cards for a finite-element code, such as febio or calculix."
             )
+        if any(setting is not None for setting in (settings.law, settings.bulk_modulus, settings.poisson)):
+            raise InputError(
+                "tables are of the draws themselves, which are incompressible: leave out the law, the bulk modulus and "
+                "Poisson's ratio (--law, --order, --bulk-modulus, --poisson), or write cards for a finite-element code."
+            )
         states = SeenStates(ensemble.most, ANGLES)
         stress = ensemble.stress(states, states.points) * settings.factor
         shear = moduli(ensemble) * settings.factor

@@ -134,6 +134,12 @@ class Posterior(PosteriorPlots):
     @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """What a reader of this posterior must know, in sentences with a code and a severity, the severest first."""
+        of_data = measurement_warnings(self.model.experiment) if self.solution.is_of_data else ()
+        return tuple(most_severe_first([*of_data, *self.warnings_of_fit]))
+
+    @cached_property
+    def warnings_of_fit(self) -> tuple[ResultWarning, ...]:
+        """Those warnings that are not of the measurements alone, which are the same for every fit of them."""
         return tuple(most_severe_first(warnings_about(self.solution, self.stable_ranges, self._is_inside)))
 
     @cached_property
@@ -152,9 +158,7 @@ class Posterior(PosteriorPlots):
         predict other loading modes - with care
         simulate with finite elements - with care
         """
-        of_test = measurement_warnings(self.model.experiment) if self.solution.is_of_data else ()
-        all_warnings = most_severe_first([*of_test, *self.warnings])
-        return answer_of(self.solution, self.stable_ranges, all_warnings, self._is_inside)
+        return answer_of(self.solution, self.stable_ranges, self.warnings, self._is_inside)
 
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.

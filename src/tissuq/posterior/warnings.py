@@ -157,7 +157,7 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
         simpler = ", or fit a law with fewer parameters" if len(solution.model.material_symbols) > 1 else ""
         yield ResultWarning(
             f"the data determine {headline} poorly: its 95 % interval is wider than its median. Unless another warning "
-            f"says why, measure more points, nearer to stretch 1, or with less noise{simpler}.",
+            f"says why, measure more points, nearer to rest, or with less noise{simpler}.",
             "poorly-determined",
         )
     if cut:

@@ -176,7 +176,7 @@ def _numbers(table: pd.DataFrame, unit: StressUnit) -> tuple[Number, ...]:
         probability = "more than 99 %" if share > 99 and len(table) > 1 else f"{share:.0f} %"
         numbers.append(Number("largest evidence", name, remark=f"probability {probability}"))
     best = str(table["elpd"].idxmax())
-    is_close = table["elpd_difference"] < SIGNIFICANT_ERRORS * table["elpd_difference_error"]
+    is_close = table["elpd_difference"] <= SIGNIFICANT_ERRORS * table["elpd_difference_error"]
     as_good = [str(name) for name in table.index[is_close] if name != best]
     remark = f"as good: {', '.join(as_good)}" if as_good else "no other as good"
     return (*numbers, Number("best for left-out measurements", best, remark=remark))

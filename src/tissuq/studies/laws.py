@@ -89,8 +89,10 @@ class LawStudy:
         Those of other laws than the recommended one are notes.
         """
         fits = self.comparison.fits
-        of_recommended = merged({self.recommended: fits[self.recommended].warnings}, named=True)
-        of_others = merged({name: fit.warnings for name, fit in fits.items() if name != self.recommended}, named=True)
+        of_recommended = merged({self.recommended: fits[self.recommended].warnings_of_fit}, named=True)
+        of_others = merged(
+            {name: fit.warnings_of_fit for name, fit in fits.items() if name != self.recommended}, named=True
+        )
         texts = [
             *of_recommended,
             *(text if text.severity is Severity.PROBLEM else text.as_note() for text in of_others),

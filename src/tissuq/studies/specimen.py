@@ -64,9 +64,9 @@ class SpecimenStudy:
 
         Those of fits beside the one that answers stand once with their names, and are notes: they concern a comparison.
         """
-        of_main = self.posteriors[self.main].warnings
+        of_main = self.posteriors[self.main].warnings_of_fit
         of_others = merged(
-            {name: fit.warnings for name, fit in self.posteriors.items() if name != self.main}, named=True
+            {name: fit.warnings_of_fit for name, fit in self.posteriors.items() if name != self.main}, named=True
         )
         beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
         of_evidence = warnings_of_evidence(

@@ -174,12 +174,18 @@ class MeasuredRows:
     def without_lines(self, lines: str, absent: Collection[int] = ()) -> MeasuredRows:
         """Return the rows but those of some lines of the file, such as ``31,45:50``; some may be absent already.
 
+        Lines of other tests in the table are theirs to leave out.
+
         Raises
         ------
         InputError
             When this is not a list of lines, or some of them hold no row that is used.
         """
-        is_left_out = rows_in(lines, [*self.table.lines, *absent], self.table.file)[: len(self)]
+        own = [*self.table.lines, *absent]
+        is_asked = rows_in(lines, [*own, *self.table.other_tests], self.table.file)[: len(own)]
+        if not is_asked.any():
+            return self
+        is_left_out = is_asked[: len(self)]
         if is_left_out.all():
             raise InputError(f"{self.table.file}: no row is left without lines {lines}.")
         remaining = self.kept(np.flatnonzero(~is_left_out), "in lines to leave out")

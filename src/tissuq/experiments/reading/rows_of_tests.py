@@ -92,7 +92,7 @@ def only_rows(table: Table, only: Mapping[str, str | int] | None) -> Table:
         rows = np.flatnonzero([text.lower() == str(value).strip().lower() for text in texts])
         if not len(rows):
             raise InputError(f"{table.place(column)}: no row has '{value}' there. There are {_listed(texts)}.")
-        table = table.taken(rows)
+        table = table.of_test(rows)
     return table
 
 

@@ -66,6 +66,8 @@ class Table:
         Those of short other tables in its text or sheet, under an empty name, and of other short sheets by their names.
     counted : str
         What ``lines`` counts: lines, or the rows of a table in memory.
+    other_tests : sequence of int
+        The lines of rows that are of other tests in the same table.
     """
 
     file: str
@@ -82,6 +84,7 @@ class Table:
     title: str = ""
     counted: str = "line"
     other_lines: Mapping[str, Lines] = field(default_factory=dict)
+    other_tests: Sequence[int] = ()
 
     @cached_property
     def quantities(self) -> list[str]:
@@ -113,6 +116,11 @@ class Table:
         return replace(
             self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions], block=block
         )
+
+    def of_test(self, rows: IndexArray) -> Table:
+        """Return the table with the rows of one of its tests."""
+        test = self.taken(rows)
+        return replace(test, other_tests=(*self.other_tests, *sorted(set(self.lines) - set(test.lines))))
 
     def some_rows(self, count: int) -> Table:
         """Return the table with rows at equal distances, about so many."""
@@ -194,7 +202,8 @@ class Table:
         """Return the table without rows in some lines, of which columns (counted from 0) hold what is no number."""
         if lines is None:
             return self
-        is_faulty = rows_in(lines, self.lines, self.file) & self._is_faulty(columns)
+        is_asked = rows_in(lines, [*self.lines, *self.other_tests], self.file)[: len(self.rows)]
+        is_faulty = is_asked & self._is_faulty(columns)
         return self._without(is_faulty, "that cannot be read, to be left out as asked,")
 
     def without_missing(self, columns: Sequence[int]) -> Table:
@@ -324,7 +333,7 @@ def rows_in(lines: str, numbers: Sequence[int], file: str) -> BoolArray:
     is_in = np.zeros(len(of_rows), dtype=bool)
     for span in str(lines).split(","):
         ends = span.split(":")
-        if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
+        if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends) or int(ends[0]) > int(ends[-1]):
             raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
         is_in_span = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
         if not is_in_span.any():

@@ -269,7 +269,7 @@ def _of_one_table(
     except SeveralSpecimens as several:
         only, labels = options.get("only") or {}, np.array(row_names(table, find_column(table, "only", several.column)))
         for label in dict.fromkeys(several.labels):
-            rows = table.taken(np.flatnonzero(labels == label))
+            rows = table.of_test(np.flatnonzero(labels == label))
             selection: ReadingOptions = {**options, "only": {**only, several.column: label}}
             yield from _of_one_table(rows, path, selection, [*names, label], columns, is_only_test=is_only_test)
         return

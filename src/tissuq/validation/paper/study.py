@@ -179,7 +179,7 @@ class PaperStudy:
         They are notes: how these fits are wrong is what the study is about, and nobody is to act on it.
         """
         sampled = {f"{name} (nuts)": fit for name, fit in self.sampled.items()}
-        texts = merged({name: fit.posterior.warnings for name, fit in {**self.main, **sampled}.items()})
+        texts = merged({name: fit.posterior.warnings_of_fit for name, fit in {**self.main, **sampled}.items()})
         texts = [text.with_end(OF_A_FIT) if "--" in text.shell else text for text in texts]
         return [text if text.severity is Severity.PROBLEM else text.as_note() for text in texts]
 
