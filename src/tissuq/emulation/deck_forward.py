@@ -23,6 +23,7 @@ from tissuq.decks.model_run import (
     check_sets,
     clear_unfinished,
     problem_of,
+    run_again,
     sets_of,
 )
 from tissuq.decks.quantity import Component, Curve
@@ -209,7 +210,14 @@ class DeckForward(Forward):
             "run", 0, self.folder / MODEL, deck.main, deck.format.name, ((self.replaced, block),), self.program,
             self.quantities, (), self._place(parameters), SolverRun(self.timeout, self.retries, abaqus=self.abaqus),
         )  # fmt: skip
-        result = carried_out(task)
+        try:
+            return self._outputs(carried_out(task), control)
+        except (ConvergenceError, UnreadableError):
+            run_again(task.folder)
+            raise
+
+    def _outputs(self, result: Mapping[str, Any], control: FloatArray | Mapping[str, FloatArray]) -> Any:
+        """Return what a run gave at the controls."""
         if result["misread"] and not result["problem"]:
             raise UnreadableError(result["misread"])
         if not isinstance(control, Mapping):
