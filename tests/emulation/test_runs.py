@@ -203,6 +203,16 @@ def test_a_run_that_fails_or_stops_early_is_a_result_and_a_wrong_shape_is_an_err
         carry_out(ForwardRun(CallableForward(lambda p: 1.0), (("C10", 1.0),), tuple(DEPTH), 1))
 
 
+def test_what_cannot_be_read_ends_all_runs_at_the_first_and_is_a_failed_run_later():
+    def cut_short(parameters):
+        raise UnreadableError("the results are cut short")
+
+    first, later = (ForwardRun(CallableForward(cut_short), (("C10", 1.0),), tuple(DEPTH), number) for number in (1, 2))
+    with pytest.raises(UnreadableError, match="the results are cut short"):
+        carry_out(first)
+    assert carry_out(later)["error"] == "UnreadableError: the results are cut short"
+
+
 def runs_with(points, failed):
     results = [
         {"parameters": dict(zip("ab", point, strict=True)), "error": "it broke" if bad else "", "seconds": 1.0,

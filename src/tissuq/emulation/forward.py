@@ -26,7 +26,7 @@ ADVICE = (
 
 
 class UnreadableError(InputError):
-    """A fault of every run, such as a quantity that the model does not write: no further run is made."""
+    """What cannot be read, such as a quantity that the model does not write: after the first run none is made."""
 
 
 class Forward(ABC):
