@@ -441,3 +441,11 @@ def test_a_control_may_fall_in_model_and_data_alike(factor):
     np.testing.assert_allclose(model._at(control, next(iter(model.measured)), curves, ""), [10, 5, 2.5], rtol=1e-9)
     with pytest.raises(UnreadableError, match="give the sign, as --factor NAME=-1"):
         model._at(-control, next(iter(model.measured)), curves, "")
+
+
+def test_a_control_that_is_held_is_told_as_what_it_is():
+    model = tq.DeckForward("block.inp", "TISSUE", "neo-hookean", "RF2@TOP", (0.7, 1.2), along="U2@TOP")
+    times, depth = np.array([0.5, 1.0, 2.0]), np.array([0.1, 0.2, 0.2])
+    curves = {quantity.name: (times, depth) for quantity in model.quantities}
+    with pytest.raises(UnreadableError, match=r"stands still or goes back at 0\.2, .*: leave holding and unloading"):
+        model._at(np.array([0.1, 0.2]), "", curves, "")
