@@ -257,6 +257,17 @@ def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
 
 
 @pytest.mark.slow
+def test_runs_that_failed_are_made_again_by_the_same_command(cli, here, words):
+    forces(here)
+    (here / "sometimes").touch()  # one run of the solver gets no licence
+    for options, failed, starts in (([], 1, 8), (["--force"], 0, 9)):
+        said = cli(*words, *WIDE, *options)
+        assert said.status == 0, said.err
+        assert sum(bool(run["error"]) for run in rows_of(here / "out" / "forward_runs.csv")) == failed
+        assert len(started(here)) == starts
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
 def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, words):
     forces(here)

@@ -58,7 +58,7 @@ def test_the_runs_lie_where_the_priors_are_together():
 def test_a_posterior_as_prior_has_its_means_sds_and_correlations():
     """Linear model: the posterior is Gaussian with closed form; Mooney's constants may be negative in tissuq or not."""
     stretch = np.linspace(0.75, 1.4, 14)
-    data = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": -5.0}, stretch, noise_sd=0.01, seed=2)
+    data = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": 5.0}, stretch, noise_sd=0.01, seed=2)
     posterior = tq.fit(data, material="ogden-1", discrepancy="none", noise_sd=0.01)
     priors, correlations = priors_of(posterior, "kPa")
     draws = posterior.data_in("kPa")["posterior"]
@@ -68,6 +68,24 @@ def test_a_posterior_as_prior_has_its_means_sds_and_correlations():
     middle = priors["mu1"].median if priors["mu1"].name == "log-normal" else priors["mu1"].mean
     assert middle == pytest.approx(1e3 * posterior.marginals["mu1"].mean, rel=0.02)
     assert correlations["mu1", "alpha1"] == pytest.approx(np.corrcoef(mu, alpha)[0, 1], abs=0.01)
+
+
+def test_a_posterior_that_a_bound_of_its_prior_cuts_is_no_prior():
+    """The default prior of the exponent is of positive ones, and that of the data is negative."""
+    data = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": -5.0}, np.linspace(0.75, 1.4, 14), noise_sd=0.01, seed=2)
+    posterior = tq.fit(data, material="ogden-1", discrepancy="none", noise_sd=0.01)
+    with pytest.raises(InputError, match=r"a bound of its prior cuts the posterior of alpha1, .* --prior alpha1=unif"):
+        priors_of(posterior, stated=["alpha1"])
+
+
+def test_a_posterior_near_a_bound_of_the_parameter_is_a_prior_of_the_others_where_one_is_stated():
+    law = "neo-hookean+dispersed-fibres@0"
+    truth = {"C10": 0.01, "k1": 0.02, "k2": 2.0, "kappa": 0.02}
+    data = tq.simulate(law, truth, np.linspace(1.02, 1.4, 20), noise_sd=4e-4, seed=2)
+    posterior = tq.fit(data, material=law, discrepancy="none", noise_sd=4e-4)
+    with pytest.raises(InputError, match=r"of kappa lies near a bound of the parameter, .* --prior kappa=uniform"):
+        priors_of(posterior)
+    assert "kappa" not in priors_of(posterior, stated=["kappa"])[0]
 
 
 @pytest.mark.parametrize(

@@ -203,6 +203,16 @@ def test_a_run_that_fails_or_stops_early_is_a_result_and_a_wrong_shape_is_an_err
         carry_out(ForwardRun(CallableForward(lambda p: 1.0), (("C10", 1.0),), tuple(DEPTH), 1))
 
 
+def test_what_cannot_be_read_ends_all_runs_at_the_first_and_is_a_failed_run_later():
+    def cut_short(parameters):
+        raise UnreadableError("the results are cut short")
+
+    first, later = (ForwardRun(CallableForward(cut_short), (("C10", 1.0),), tuple(DEPTH), number) for number in (1, 2))
+    with pytest.raises(UnreadableError, match="the results are cut short"):
+        carry_out(first)
+    assert carry_out(later)["error"] == "UnreadableError: the results are cut short"
+
+
 def runs_with(points, failed):
     results = [
         {"parameters": dict(zip("ab", point, strict=True)), "error": "it broke" if bad else "", "seconds": 1.0,
@@ -431,3 +441,11 @@ def test_a_control_may_fall_in_model_and_data_alike(factor):
     np.testing.assert_allclose(model._at(control, next(iter(model.measured)), curves, ""), [10, 5, 2.5], rtol=1e-9)
     with pytest.raises(UnreadableError, match="give the sign, as --factor NAME=-1"):
         model._at(-control, next(iter(model.measured)), curves, "")
+
+
+def test_a_control_that_is_held_is_told_as_what_it_is():
+    model = tq.DeckForward("block.inp", "TISSUE", "neo-hookean", "RF2@TOP", (0.7, 1.2), along="U2@TOP")
+    times, depth = np.array([0.5, 1.0, 2.0]), np.array([0.1, 0.2, 0.2])
+    curves = {quantity.name: (times, depth) for quantity in model.quantities}
+    with pytest.raises(UnreadableError, match=r"stands still or goes back at 0\.2, .*: leave holding and unloading"):
+        model._at(np.array([0.1, 0.2]), "", curves, "")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.emulation.forward import _client
 from tissuq.errors import InputError
 
 DEPTH = np.linspace(0.05, 1.0, 12)
@@ -88,6 +89,19 @@ def test_a_server_that_is_not_there_is_told():
         free.bind(("127.0.0.1", 0))
         with pytest.raises(InputError, match="no UM-Bridge server answers at"):
             tq.calibrate(DEPTH, MEASURED, tq.UmbridgeForward(f"http://127.0.0.1:{free.getsockname()[1]}"), PRIORS)
+
+
+@pytest.mark.parametrize("error", [KeyError("inputSizes"), ValueError("Expecting value: line 1 column 1")])
+def test_a_server_that_does_not_tell_its_sizes_is_told(address, monkeypatch, error):
+    import umbridge
+
+    def refused(model):
+        raise error
+
+    monkeypatch.setattr(umbridge.HTTPModel, "get_input_sizes", refused)
+    _client.cache_clear()
+    with pytest.raises(InputError, match=r"does not say what 'spring' takes \((Key|Value)Error: .*: see its log"):
+        tq.calibrate(DEPTH, MEASURED, tq.UmbridgeForward(address, "spring"), PRIORS)
 
 
 def test_a_missing_client_is_told(monkeypatch):

@@ -81,6 +81,28 @@ def test_points_lie_around_the_highest_peak_and_not_around_the_first_that_is_met
     assert posterior.marginals["k2"].hdi()[1] > 2.65
 
 
+def test_points_that_still_move_along_a_ridge_go_on():
+    """Stress on a grid of k2 and kappa, C10 and k1 (of two coincident families) integrated; their prior is 1 / k1."""
+    law, truth = "neo-hookean+dispersed-fibres@0", {"C10": 0.01, "k1": 0.02, "k2": 2.0, "kappa": 0.02}
+    stretch, sd = np.linspace(1.02, 1.4, 20), 1e-4
+    data = tq.simulate(law, truth, stretch, noise_sd=sd, seed=2)
+    k2, kappa = (axis.ravel() for axis in np.meshgrid(np.linspace(1.2, 3.2, 101), np.linspace(0, 0.1, 101)))
+    k2, spread = k2[:, None], kappa[:, None]
+    strain = spread * (stretch**2 + 2 / stretch - 3) + (1 - 3 * spread) * (stretch**2 - 1)
+    slope = spread * (2 * stretch - 2 / stretch**2) + (1 - 3 * spread) * 2 * stretch
+    fibres = 2 * strain * np.exp(k2 * strain**2) * slope
+    columns = np.stack([np.broadcast_to(2 * stretch - 2 / stretch**2, fibres.shape), fibres], axis=-1)
+    inner = columns.swapaxes(1, 2) @ columns
+    best = np.linalg.solve(inner, columns.swapaxes(1, 2) @ data.stress.ravel()[:, None])
+    misfit = ((data.stress.ravel() - (columns @ best)[..., 0]) ** 2).sum(axis=1) / sd**2
+    heights = -0.5 * misfit - 0.5 * np.linalg.slogdet(inner)[1] - np.log(k2[:, 0] * best[:, 1, 0])
+    weights = np.exp(heights - heights.max())
+    mean = float(weights @ kappa / weights.sum())
+    spread_of_kappa = float(np.sqrt(weights @ (kappa - mean) ** 2 / weights.sum()))
+    found = tq.fit(data, material=law, discrepancy="none", noise_sd=sd).marginals["kappa"]
+    assert found.mean == pytest.approx(mean, abs=spread_of_kappa)
+
+
 def test_points_that_are_not_effective_are_said(monkeypatch):
     monkeypatch.setattr("tissuq.inference.enumerators.adapted_points.EFFECTIVE_MULTIPLE", 1e6)
     with pytest.raises(ConvergenceError, match=r"posterior of alpha1, noise_sd was not found well enough: \d+ of"):

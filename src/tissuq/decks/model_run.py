@@ -160,6 +160,12 @@ def problem_of(folder: Path) -> str:
         return ""
 
 
+def run_again(folder: Path) -> None:
+    """Mark the run in a folder as one that is to be made again when it is next asked for; its files stay."""
+    stored: Mapping[str, Any] = json.loads((folder / DONE).read_text(encoding="utf-8"))
+    (folder / DONE).write_text(json.dumps({**stored, "is_whole": False}), encoding="utf-8")
+
+
 def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
     """Return the sets of nodes of a deck where a quantity is that of a set.
 
@@ -295,8 +301,7 @@ def _saved_fields(task: ModelRun, results: Results) -> tuple[str, Any]:
 
 def _strip(folder: Path) -> None:
     """Take off a run's folder what the solver left there."""
-    stored: Mapping[str, Any] = json.loads((folder / DONE).read_text(encoding="utf-8"))
-    (folder / DONE).write_text(json.dumps({**stored, "is_whole": False}), encoding="utf-8")
+    run_again(folder)
     for path in sorted(folder.rglob("*"), reverse=True):
         if path.is_dir() and not path.is_symlink():
             if not any(path.iterdir()):

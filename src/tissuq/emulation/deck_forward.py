@@ -23,6 +23,7 @@ from tissuq.decks.model_run import (
     check_sets,
     clear_unfinished,
     problem_of,
+    run_again,
     sets_of,
 )
 from tissuq.decks.quantity import Component, Curve
@@ -209,7 +210,14 @@ class DeckForward(Forward):
             "run", 0, self.folder / MODEL, deck.main, deck.format.name, ((self.replaced, block),), self.program,
             self.quantities, (), self._place(parameters), SolverRun(self.timeout, self.retries, abaqus=self.abaqus),
         )  # fmt: skip
-        result = carried_out(task)
+        try:
+            return self._outputs(carried_out(task), control)
+        except (ConvergenceError, UnreadableError):
+            run_again(task.folder)
+            raise
+
+    def _outputs(self, result: Mapping[str, Any], control: FloatArray | Mapping[str, FloatArray]) -> Any:
+        """Return what a run gave at the controls."""
         if result["misread"] and not result["problem"]:
             raise UnreadableError(result["misread"])
         if not isinstance(control, Mapping):
@@ -264,7 +272,13 @@ class DeckForward(Forward):
         reached = float(along[-1]) if count else 0.0
         is_short = count < 2 or reached < control.max() * (1 - 1e-9)
         has_failed = is_short and bool(problem)  # and may have ended anywhere
-        if count > 1 and not has_failed and ((np.diff(along) <= 0).any() or control.min() < along[0]):
+        back = np.flatnonzero(np.diff(along) <= 0)
+        if len(back) and not has_failed and along[0] <= control.min() and control.max() <= along.max():
+            raise UnreadableError(
+                f"the control of the model stands still or goes back at {sign * along[back[0]]:.4g}, and must go "
+                "on in one direction: leave holding and unloading out of the deck."
+            )
+        if count > 1 and not has_failed and (len(back) or control.min() < along[0]):
             raise UnreadableError(
                 f"the control of the model goes from {sign * along[0]:.4g} to {sign * reached:.4g}, and must go "
                 f"on from {sign * control.min():.4g} or before to {sign * control.max():.4g}, as was measured: give "

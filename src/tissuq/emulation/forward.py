@@ -26,7 +26,7 @@ ADVICE = (
 
 
 class UnreadableError(InputError):
-    """A fault of every run, such as a quantity that the model does not write: no further run is made."""
+    """What cannot be read, such as a quantity that the model does not write: after the first run none is made."""
 
 
 class Forward(ABC):
@@ -345,5 +345,9 @@ def _client(url: str, model: str) -> tuple[Any, tuple[int, ...]]:
         raise InputError(f"no UM-Bridge server answers at {url} ({type(error).__name__}). Start it first.") from error
     if model not in models:
         raise InputError(f"the server at {url} has no model '{model}'; it has {', '.join(models)}.")
-    client = umbridge.HTTPModel(url, model)
-    return client, tuple(client.get_input_sizes())
+    try:
+        client = umbridge.HTTPModel(url, model)
+        return client, tuple(map(int, client.get_input_sizes()))
+    except Exception as error:  # whatever the server answers
+        answer = f"{type(error).__name__}: {error}"
+        raise InputError(f"the server at {url} does not say what '{model}' takes ({answer}): see its log.") from error

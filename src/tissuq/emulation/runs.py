@@ -125,15 +125,16 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     Raises
     ------
     InputError
-        When the model returns no row of numbers. One that is too short or too long is a failed run.
+        When the model returns no row of numbers, or the first run cannot be read. One that is too short or too long is
+        a failed run.
     """
     start = perf_counter()
     result: dict[str, Any] = {"outputs": [], "error": ""}
     try:
         outputs = run.forward.run(dict(run.parameters), np.array(run.control))
-    except UnreadableError:
-        raise
     except Exception as error:  # a failed run is a result, which is listed
+        if isinstance(error, UnreadableError) and run.number == 1:
+            raise
         first_line = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
         result["error"] = first_line + _without_prior(error, dict(run.parameters))
     else:

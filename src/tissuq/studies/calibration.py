@@ -169,9 +169,9 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
     if settings.prior_run is None:
         return settings
     posterior = load_law(folder / settings.prior_run, str(settings.material))
-    priors, correlations = priors_of(posterior, settings.unit)
     stated = settings.priors
-    pairs = {",".join(pair): value for pair, value in correlations.items() if not set(pair) & set(stated)}
+    priors, correlations = priors_of(posterior, settings.unit, stated)
+    pairs = {",".join(pair): value for pair, value in correlations.items()}
     changes = {
         "priors": {symbol: prior.as_dict() for symbol, prior in priors.items()} | stated,
         "prior_correlations": pairs | settings.prior_correlations,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import suppress
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 from warnings import warn
 
 import numpy as np
 
+from tissuq.arrays import FloatArray
 from tissuq.errors import InputError
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, material_named, standard_name
@@ -16,6 +19,7 @@ from tissuq.model.discrepancy import Auto, Discrepancy, NoDiscrepancy
 from tissuq.parameters.priors import LogNormal, Normal, Prior
 from tissuq.posterior.archive import read_modes
 from tissuq.posterior.posterior import Posterior
+from tissuq.result_warning import symbols_in
 from tissuq.studies.settings import RECIPE, damage_reported, load_settings, setting_of
 
 if TYPE_CHECKING:
@@ -224,7 +228,9 @@ def _of_other_materials(run: Path, names: list[str], law: Material) -> InputErro
     )
 
 
-def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior], dict[tuple[str, str], float]]:
+def priors_of(
+    posterior: Posterior, unit: str = "MPa", stated: Collection[str] = ()
+) -> tuple[dict[str, Prior], dict[tuple[str, str], float]]:
     """Return priors of a law's parameters with mean, sd and correlations of a posterior.
 
     Positive parameters get a log-normal prior with mean and sd of the logarithms, others a normal one; what the
@@ -235,6 +241,8 @@ def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior]
     posterior : Posterior
     unit : str
         Of the parameters that are stresses.
+    stated : collection of str
+        Parameters that have priors, and get none here.
 
     Returns
     -------
@@ -245,7 +253,7 @@ def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior]
     Raises
     ------
     InputError
-        When a parameter has bounds near which the posterior lies.
+        When a parameter has bounds near which the posterior lies, or the bound of a prior cuts one.
 
     Examples
     --------
@@ -259,9 +267,19 @@ def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior]
     draws = posterior.data_in("MPa")["posterior"]
     to_mpa = stress_unit(unit).to_mpa
     priors: dict[str, Prior] = {}
-    lines = []
-    for parameter in posterior.model.material.plain.parameters:
+    lines: dict[str, FloatArray] = {}
+    material = posterior.model.material.plain
+    cut = [of.symbol for of in material.parameters if of.symbol in symbols_in(posterior.warnings, "prior-bound")]
+    if cut:
+        raise InputError(
+            f"a bound of its prior cuts the posterior of {' and that of '.join(cut)}, so that it is not the data's: "
+            f"fit the tests with a wider one, as --prior {cut[0]}=uniform(...), or give priors yourself in place of "
+            "the run."
+        )
+    for parameter in material.parameters:
         symbol, (low, high) = parameter.symbol, parameter.support
+        if symbol in stated:
+            continue
         scale = to_mpa if parameter.unit else 1.0
         values = np.asarray(draws[symbol], dtype=np.float64).ravel() / scale
         is_positive = low == 0 and high == np.inf
@@ -273,10 +291,10 @@ def priors_of(posterior: Posterior, unit: str = "MPa") -> tuple[dict[str, Prior]
                 f"its prior yourself, as --prior {symbol}=uniform(...)."
             )
         priors[symbol] = LogNormal(float(np.exp(mean)), sd) if is_positive else Normal(mean, sd)
-        lines.append(line)
-    matrix, symbols = np.corrcoef(np.atleast_2d(lines)).reshape(len(lines), -1), list(priors)
-    pairs = [(i, j) for i in range(len(symbols)) for j in range(i + 1, len(symbols))]
+        lines[symbol] = line
     correlations = {
-        (symbols[i], symbols[j]): float(matrix[i, j]) for i, j in pairs if abs(matrix[i, j]) > SMALL_CORRELATION
+        (one, other): correlation
+        for one, other in combinations(lines, 2)
+        if abs(correlation := float(np.corrcoef(lines[one], lines[other])[0, 1])) > SMALL_CORRELATION
     }
     return priors, correlations

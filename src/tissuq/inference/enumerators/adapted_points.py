@@ -31,7 +31,7 @@ EFFECTIVE_MULTIPLE = 20.0
 IRRELEVANT_LOG_DROP = 14.0
 """Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
 MIN_ROUNDS, MAX_ROUNDS, MAX_CHANGE = 4, 40, 0.1
-"""Rounds at least, unless a similar model is known, and at most, and change of the log of the mass in the last."""
+"""Rounds at least, of fewer where a similar model is known, and at most, and change of the log of the mass in these."""
 SURVEY_POINTS, CLIMBS, LEAST_DISTANCE = 1024, 8, 0.7
 """Points of the prior among which climbs to peaks begin, how many do, and how far apart."""
 RELEVANT_LOG_DROP = 20.0
@@ -78,13 +78,14 @@ class AdaptedPoints:
 
     def _solution(self, model: StatisticalModel, seed: int) -> Solution:
         density, dimension = _Density(model), len(model.nonlinear)
-        min_effective, earlier = EFFECTIVE_MULTIPLE * self.accuracy.min_effective, np.inf
+        min_effective, log_masses = EFFECTIVE_MULTIPLE * self.accuracy.min_effective, list[float]()
         starts = [self.start or _around_peaks(density, dimension)]
         rounds = weighted_points(density, starts, 1 << (POINTS_PER_PARAMETER * dimension).bit_length(), seed=0)
         for done, (points, log_weights) in enumerate(islice(rounds, MAX_ROUNDS), 1):
             number, log_mass = effective(log_weights), float(np.logaddexp.reduce(log_weights)) - log(len(points))
-            is_settled, earlier = number >= min_effective and abs(log_mass - earlier) < MAX_CHANGE, log_mass
-            if is_settled and (self.start or done >= MIN_ROUNDS):
+            log_masses.append(log_mass)
+            needed = 2 if self.start else MIN_ROUNDS
+            if done >= needed and number >= min_effective and np.ptp(log_masses[-MIN_ROUNDS:]) < MAX_CHANGE:
                 break
         else:
             raise ConvergenceError(
