@@ -97,7 +97,7 @@ def test_chosen_priors_replace_defaults():
         (lambda: model(noise_sd=float("nan")), "noise_sd must be a positive number"),
         (
             lambda: model(noise_sd="big"),
-            "one of unknown, independent, proportional, repeats, autoregressive; not 'big'",
+            "no noise named 'big': choose one of unknown, independent, proportional, repeats, autoregressive",
         ),
         (lambda: model("yeoh", Yeoh()), "adds C20, C30, which material 'yeoh' has already"),
         (lambda: model(chosen_priors={"mu": tq.Uniform(0, 1)}), "a prior for 'mu'"),
