@@ -185,6 +185,10 @@ def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--kernel", "cubic"], "kernel"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--discrepancy", "auto"], "cannot be used with"),
         (["punch.csv", "--umbridge", "http://127.0.0.1:9", *USUAL], "UM-Bridge"),
+        (
+            ["punch.csv", "--forward", "force.py:force", *USUAL, "--timeout", 5, "--keep"],
+            "--timeout and --keep: only a",
+        ),
     ],
 )
 def test_bad_input_gives_one_message_and_leaves_nothing(cli, here, arguments, words):

@@ -85,9 +85,15 @@ def test_what_is_no_run_is_refused(cli, here, arguments, words):
     assert "Traceback" not in said.err
 
 
+def test_a_run_is_compared_once(cli, here):
+    said = cli("compare", "run", "./run")
+    assert said.status == 2
+    assert "a run is given twice among run, run: name every run once" in said.err
+
+
 def test_a_file_that_is_no_posterior_is_named_and_refused(cli, here):
     (here / "broken.nc").write_text("nothing")
-    said = cli("compare", "broken.nc", "broken.nc")
+    said = cli("compare", "broken.nc")
     assert said.status == 2
     assert "'broken.nc' is damaged or no posterior of tissuq" in " ".join(said.err.split())
 

@@ -117,6 +117,7 @@ BAD = [
     (["RUN", "--discrepancy", "none", "--at2", "1"], ["one control", "--at2"]),
     (["RUN", "--discrepancy", "none", "--mode", "biaxial"], ["several controls", "stretch of axis 2"]),
     (["RUN", "--discrepancy", "none", "--points", "1"], ["points", "2"]),
+    (["RUN", "--discrepancy", "none", "--at", "1.1,1.2", "--points", "7"], ["--grid-points are those of a range"]),
     (["RUN", "--discrepancy", "none", "--prob", "1"], ["prob", "less than 1"]),
     (["RUN", "--discrepancy", "none", "--stress", "kirchhoff"], ["stress_type", "'kirchhoff'"]),
     (["RUN", "--discrepancy", "none", "--cycle", "1"], ["--cycle can only be used with --data"]),

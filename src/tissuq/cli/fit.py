@@ -188,10 +188,13 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     target = call.target(Path("runs") / Path(settings.files[0]).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
     how, running = call.how, dict[str, Any]()
+    of_solver = ("max_jobs", "timeout", "retries", "keep", "abaqus")
     workers = how.workers
     if settings.models:
         workers = how.max_jobs or os.cpu_count() or 1
-        running = {"timeout": how.timeout, "retries": how.retries, "keep": how.keep, "abaqus": how.abaqus}
+        running = {name: getattr(how, name) for name in of_solver[1:]}
+    elif idle := [f"--{name.replace('_', '-')}" for name in of_solver if name in how.model_fields_set]:
+        raise InputError(f"{' and '.join(idle)}: only a finite-element model (--model) has a solver; leave it out.")
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
         study = run_calibration(settings, call.beside, runs_in=runs_in, workers=workers, step=step, **running)
     print(f"Forward runs: {runs_in}")

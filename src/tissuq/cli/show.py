@@ -150,6 +150,8 @@ def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:
     from tissuq.posterior.archive import unreadable
 
     files: dict[str, Path] = {}
+    if len({run.resolve() for run in runs}) < len(runs):
+        raise InputError(f"a run is given twice among {', '.join(map(str, runs))}: name every run once.")
     for run in runs:
         paths = sorted((run / "posterior").glob("*.nc")) if run.is_dir() else [run]
         if not paths or not all(path.is_file() for path in paths):

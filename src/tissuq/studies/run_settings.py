@@ -111,6 +111,9 @@ class PredictionSettings(RunSettings):
         from tissuq.experiments.modes import loading_mode
 
         controls = loading_mode(mode).controls
+        asked = [text for text in (self.stretch, self.stretch2) if text is not None]
+        if self.points != POINTS and asked and not any(":" in text for text in asked):
+            raise InputError("--grid-points are those of a range, such as --at 0.7:2.0: leave them out, or give one.")
         if self.stretch2 is not None and len(controls) == 1:
             raise InputError(f"mode '{mode}' has one control, {controls[0].name}: leave --at2 out.")
         if len(controls) == 1 or self.stretch is self.stretch2 is None:
