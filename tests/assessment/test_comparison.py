@@ -99,6 +99,20 @@ def test_saved_posteriors_compare_like_those_in_memory(fits, tmp_path):
     assert (first.loc["none", refitted[:2]] == 0).all()  # has nothing to scale
 
 
+def test_fits_of_a_list_are_named_by_material_and_discrepancy(fits, tmp_path):
+    fits["yeoh"].save(tmp_path / "yeoh.nc")
+    saved = xr.open_datatree(tmp_path / "yeoh.nc", engine="h5netcdf").load()
+    listed = tq.compare([fits["none"], saved, fits["none"]])
+    assert set(listed.index) == {"neo-hookean, none", "neo-hookean, yeoh", "neo-hookean, none (3)"}
+    by_name = tq.compare({"none": fits["none"], "yeoh": fits["yeoh"]})
+    assert listed.loc["neo-hookean, none", "elpd"] == by_name.loc["none", "elpd"]
+    weights = tq.average([fits["none"], fits["taylor"]]).weights
+    assert list(weights) == ["neo-hookean, none", "neo-hookean, taylor"]
+    for wrong in (None, "yeoh", [1, 2], {"none": 1}):
+        with pytest.raises(tq.InputError, match="fits are needed, such as"):
+            tq.compare(wrong)
+
+
 def test_fits_of_other_data_and_single_fits_are_refused(fits):
     with pytest.raises(tq.InputError, match="two fits or more"):
         tq.compare({"none": fits["none"]})

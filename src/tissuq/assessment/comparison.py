@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -125,7 +125,30 @@ class Average:
         return blended(marginals, (float(ends[:, 0].min()), float(ends[:, 1].max())))
 
 
-def average(fits: Mapping[str, Any]) -> Average:
+def named_fits(fits: Any) -> dict[str, Any]:
+    """Return fits by name; those of a sequence are named by material and discrepancy.
+
+    Raises
+    ------
+    InputError
+        When it is neither a mapping nor a sequence of fits.
+    """
+    is_by_name = isinstance(fits, Mapping) and not hasattr(fits, "attrs")  # which a tree, itself a mapping, has
+    sequence = fits if isinstance(fits, Sequence) and not isinstance(fits, str) else [fits]
+    named = dict[str, Any]()
+    for name, fit in fits.items() if is_by_name else (("", fit) for fit in sequence):
+        if hasattr(fit, "solution"):
+            kind = fit.solution.model.material.name, fit.solution.model.discrepancy.name
+        elif hasattr(fit, "attrs"):
+            kind = fit.attrs.get("material"), fit.attrs.get("discrepancy")
+        else:
+            raise InputError(f"fits are needed, such as {{'none': tq.fit(data, ...)}}, or a list; not {fit!r:.80}.")
+        unnumbered = str(name) or "{}, {}".format(*kind)
+        named[f"{unnumbered} ({len(named) + 1})" if unnumbered in named else unnumbered] = fit
+    return named
+
+
+def average(fits: Mapping[str, Any] | Sequence[Any]) -> Average:
     """Return the average of fits of the same data by their evidence, each as probable as the others before the data.
 
     The parameters keep their meaning in the fits: a fit whose discrepancy takes a share of the initial stiffness
@@ -133,8 +156,9 @@ def average(fits: Mapping[str, Any]) -> Average:
 
     Parameters
     ----------
-    fits : mapping of str to Posterior
-        By name: the same material on the same measurements, with other discrepancies, noises or priors.
+    fits : mapping of str to Posterior, or sequence of Posterior
+        By name, or as of `named_fits`: the same material on the same measurements, with other discrepancies, noises or
+        priors.
 
     Raises
     ------
@@ -157,6 +181,7 @@ def average(fits: Mapping[str, Any]) -> Average:
     >>> list(found.summary().columns)
     ['mean', 'sd', 'hdi_low', 'hdi_high']
     """
+    fits = named_fits(fits)
     _check_average(fits)
     evidence = np.array([fit.log_evidence for fit in fits.values()])
     weights = np.exp(evidence - evidence.max())
@@ -192,13 +217,14 @@ EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
 
 
-def compare(fits: Mapping[str, Any], unit: str = "MPa") -> pd.DataFrame:
+def compare(fits: Mapping[str, Any] | Sequence[Any], unit: str = "MPa") -> pd.DataFrame:
     """Return fits of the same measurements side by side, that with the most evidence first.
 
     Parameters
     ----------
-    fits : mapping of str to Posterior or xarray.DataTree
-        By name; trees are those of `Posterior.data`, as saved files hold them.
+    fits : mapping of str to Posterior or xarray.DataTree, or sequence of these
+        By name, those of a sequence named by material and discrepancy; trees are those of `Posterior.data`, as saved
+        files hold them.
     unit : str
         Of stress, such as ``"kPa"``; it stands at the head of the columns.
 
@@ -244,7 +270,7 @@ def compare(fits: Mapping[str, Any], unit: str = "MPa") -> pd.DataFrame:
     """
     import pandas as pd
 
-    trees = {name: _tree(fit) for name, fit in fits.items()}
+    trees = {name: _tree(fit) for name, fit in named_fits(fits).items()}
     _check_comparable(trees)
     evidence = _numbers(trees, "log_evidence")
     factor = evidence - np.nanmax([*evidence, -np.inf])

@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from tissuq.assessment.comparison import named_fits
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -190,7 +191,9 @@ def plot_compare(
     ['neo-hookean, none', 'gent, none']
     >>> plt.close(axis.figure)
     """
-    named = _named(posteriors)
+    named = {name: posterior.solution for name, posterior in named_fits(posteriors).items()}
+    if not named:
+        raise InputError("there is nothing to compare: give posteriors, such as {'none': tq.fit(data, ...)}.")
     symbol = parameter or MODULUS
     for solution in named.values():
         marginal_of(solution, symbol)
@@ -200,18 +203,3 @@ def plot_compare(
         shown_names = {fill(name, LETTERS_OF_NAME): solution for name, solution in named.items()}
         ridges(drawn.axes[0], shown_names, symbol, shown, prob=prob, truth=truth)
     return drawn.result
-
-
-def _named(posteriors: Mapping[str, PosteriorPlots] | Sequence[PosteriorPlots]) -> dict[str, Solution]:
-    """Return solutions by name."""
-    if isinstance(posteriors, Mapping):
-        named = {str(name): posterior.solution for name, posterior in posteriors.items()}
-    else:
-        named = {}
-        for posterior in [posteriors] if hasattr(posteriors, "solution") else posteriors:
-            model = posterior.solution.model
-            name = f"{model.material.name}, {model.discrepancy.name}"
-            named[f"{name} ({len(named) + 1})" if name in named else name] = posterior.solution
-    if not named:
-        raise InputError("there is nothing to compare: give posteriors, such as {'none': tq.fit(data, ...)}.")
-    return named
