@@ -205,3 +205,10 @@ def test_cells_with_their_unit_are_read_as_those_of_a_file():
     cells = {"stretch": [1.0, 1.1, 1.2], "stress": ["0 kPa", "1.2 kPa", "2.5 kPa"]}
     with pytest.warns(UserWarning, match="read as numbers in kPa"):
         assert tq.read(cells).stress.tolist() == pytest.approx([0, 0.0012, 0.0025])
+
+
+@pytest.mark.parametrize("reader", [tq.read, tq.read_tests, tq.inspect])
+@pytest.mark.parametrize("data", [None, 3, [FRAME]])
+def test_what_is_neither_file_nor_table_is_refused(reader, data):
+    with pytest.raises(tq.InputError, match=r"a file \('test.csv'\) or a table .* is needed, not "):
+        reader(data)

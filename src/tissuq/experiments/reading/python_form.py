@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -105,9 +106,18 @@ def wording_for(data: Any, stress_unit: str = "MPa") -> Callable[[str], str]:
     return partial(in_python, stress_unit=stress_unit) if is_data_frame(data) else str
 
 
+def is_to_be_read(data: Any) -> bool:
+    """Tell whether measurements are still to be read: a file, or a table."""
+    return isinstance(data, str | os.PathLike) or is_data_frame(data)
+
+
 @contextmanager
 def refusals_worded_for(data: Any) -> Iterator[None]:
-    """Word refusals as all messages about these measurements."""
+    """Refuse what is neither file nor table, and word other refusals as all messages about these measurements."""
+    if not is_to_be_read(data):
+        raise InputError(
+            f"a file ('test.csv') or a table (a DataFrame, a Dataset of xarray) is needed, not {data!r:.80}."
+        )
     try:
         yield
     except InputError as refusal:

@@ -23,7 +23,7 @@ from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.python_form import refusals_worded_for
+from tissuq.experiments.reading.python_form import is_to_be_read, refusals_worded_for
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
@@ -102,11 +102,6 @@ def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False)
     return experiments
 
 
-def _is_read(data: Any) -> bool:
-    """Tell whether measurements are still to be read: a file, or a table."""
-    return isinstance(data, str | os.PathLike) or is_data_frame(data)
-
-
 def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
     """Return what people have as an experiment: one as it is, all tests in a file or a table, or several together.
 
@@ -129,7 +124,7 @@ def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[Py
     [0.0, 0.2]
     """
     spelled_out(options, READING_OPTIONS, more_names)
-    if _is_read(data):
+    if is_to_be_read(data):
         return Experiment.of(read_tests(data, **options))
     if isinstance(data, Experiment):
         if options:
@@ -142,7 +137,7 @@ def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[Py
         is_one_of_several = len(data) > 1
         tests = [
             Experiment.of(_read(test, options, is_one_of_several=is_one_of_several))
-            if _is_read(test)
+            if is_to_be_read(test)
             else measurements(test, more_names, **options)
             for test in data
         ]
