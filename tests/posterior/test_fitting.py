@@ -6,6 +6,7 @@ import re
 from itertools import product
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import tissuq as tq
@@ -259,6 +260,18 @@ def test_fewer_points_than_means_are_counted_in_rows_of_the_file():
     (correlated,) = [warning for warning in warnings if warning.code == "correlated-residuals"]
     every = int(re.search(r"every=(\d+)", str(correlated)).group(1))
     assert (every % 12, every > 24) == (0, True)
+
+
+def test_fewer_points_than_every_fifth_are_counted_in_rows_of_the_file(tmp_path):
+    stretch = np.linspace(1.0, 1.5, 400)
+    stress = 0.5 * (stretch - stretch**-2) + 0.01 * np.sin(2 * np.pi * np.arange(400) / 100)  # 20 of these a period
+    pd.DataFrame({"stretch": stretch, "stress_MPa": stress}).to_csv(tmp_path / "test.csv", index=False)
+    fit = tq.fit(tq.read(tmp_path / "test.csv", every=5), discrepancy="taylor", noise="independent")
+    fit.save(tmp_path / "fit.nc")
+    for posterior in (fit, tq.Posterior.load(tmp_path / "fit.nc")):
+        (correlated,) = [warning for warning in posterior.warnings if warning.code == "correlated-residuals"]
+        every = int(re.search(r"every=(\d+)", str(correlated)).group(1))
+        assert (every % 5, every > 5) == (0, True)
 
 
 @pytest.mark.parametrize(

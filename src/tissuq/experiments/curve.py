@@ -51,6 +51,8 @@ class Curve:
         Those of the test.
     averaged : int
         Consecutive measurements, at most, of which each row is the mean; 1 where rows are single measurements.
+    apart : int
+        Rows of the file from one measurement to the next: more than 1 where every second, third ... was read.
     warnings : tuple of ResultWarning
         What is implausible in the file that the test was read from, or in its course.
     """
@@ -68,6 +70,7 @@ class Curve:
     direction: str = ""
     condition: str = ""
     averaged: int = 1
+    apart: int = 1
     warnings: tuple[ResultWarning, ...] = ()
 
     def __len__(self) -> int:

@@ -75,6 +75,7 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
                 "mode": test.mode.name,
                 "least_errors": json.dumps(test.least_errors),
                 "averaged": test.curves[0].averaged,
+                "apart": test.curves[0].apart,
                 "warnings": json.dumps([_plain_warning(warning) for warning in test.curves[0].warnings]),
             }
             | {label: getattr(test, label) for label in LABELS},
@@ -165,16 +166,14 @@ def _standard_error_of(test: Experiment) -> dict[str, Any]:
 
 def _test(group: Group) -> Experiment:
     labels = {label: str(group.attrs.get(label, "")) for label in LABELS}
-    averaged = int(group.attrs.get("averaged", 1))
+    rows = {name: int(group.attrs.get(name, 1)) for name in ("averaged", "apart")}
     stretch, stress = group.arrays["stretch"], group.arrays["stress"]
     errors = {
         "standard_error": group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T,
         "least_errors": json.loads(group.attrs.get("least_errors", "{}")),
     }
     warnings = tuple(_warning(**plain) for plain in json.loads(group.attrs.get("warnings", "[]")))
-    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(
-        averaged=averaged, warnings=warnings, **labels
-    )
+    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(warnings=warnings, **rows, **labels)
 
 
 def _plain_warning(warning: ResultWarning) -> dict[str, str]:

@@ -206,7 +206,7 @@ def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning
     if any(curve.is_back.any() for curve in model.experiment.curves):
         return ResultWarning(text + "Fit one branch of the cycle ({branch}).", "correlated-residuals", branch="loading")
     every = _every_uncorrelated(lag1, min(len(curve) for curve in model.experiment.curves))
-    every *= max(curve.averaged for curve in model.experiment.curves)
+    every *= max(curve.averaged * curve.apart for curve in model.experiment.curves)
     if model.noise.is_consecutive:
         return ResultWarning(text + "Fit with fewer points ({every}).", "correlated-residuals", every=every)
     return ResultWarning(

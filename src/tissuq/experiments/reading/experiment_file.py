@@ -229,7 +229,9 @@ def read_rows(
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
         least_errors=errors | least_errors(tested),
-    ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
+    ).labelled(
+        stress_unit=shown.name, specimen=specimen_of(used.table), apart=step, **labels_of(used.table, [*names, *words])
+    )
     problems = (spread.problem for spread in spreads if spread.problem)
     doubts = *assumptions(used, choices, options), *dimensions.averages, *dimensions.contradictions
     about_loads = filter(None, (doubt, *(load.note for load in loads)))
