@@ -242,6 +242,10 @@ def test_what_is_no_parameter_is_refused_before_a_figure_is_made(posterior):
 
 
 def test_a_comparison_has_a_row_for_every_fit_with_its_interval(posterior, plain):
+    unnamed = tq.plot_compare(fit for fit in (posterior, posterior))
+    names = [label.get_text().replace("\n", " ") for label in unnamed.get_yticklabels()]
+    assert names[1] == f"{names[0]} (2)"
+    plt.close(unnamed.figure)
     axis = tq.plot_compare({"with": posterior, "without": plain}, truth=1.0)
     assert [label.get_text() for label in axis.get_yticklabels()] == ["with", "without"]
     bars = [

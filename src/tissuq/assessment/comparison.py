@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.arrays import BoolArray, FloatArray
+from tissuq.assessment.named_fits import named_fits
 from tissuq.assessment.sensitivity import SCALE_FACTORS
 from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
@@ -123,29 +124,6 @@ class Average:
         ends = np.array([solution.model.priors[symbol].support for _, solution in self._weighted_fits])
         marginals = [(weight, solution.marginals[symbol]) for weight, solution in self._weighted_fits]
         return blended(marginals, (float(ends[:, 0].min()), float(ends[:, 1].max())))
-
-
-def named_fits(fits: Any) -> dict[str, Any]:
-    """Return fits by name; those of a sequence are named by material and discrepancy.
-
-    Raises
-    ------
-    InputError
-        When it is neither a mapping nor a sequence of fits.
-    """
-    is_by_name = isinstance(fits, Mapping) and not hasattr(fits, "attrs")  # which a tree, itself a mapping, has
-    sequence = fits if isinstance(fits, Sequence) and not isinstance(fits, str) else [fits]
-    named = dict[str, Any]()
-    for name, fit in fits.items() if is_by_name else (("", fit) for fit in sequence):
-        if hasattr(fit, "solution"):
-            kind = fit.solution.model.material.name, fit.solution.model.discrepancy.name
-        elif hasattr(fit, "attrs"):
-            kind = fit.attrs.get("material"), fit.attrs.get("discrepancy")
-        else:
-            raise InputError(f"fits are needed, such as {{'none': tq.fit(data, ...)}}, or a list; not {fit!r:.80}.")
-        unnumbered = str(name) or "{}, {}".format(*kind)
-        named[f"{unnumbered} ({len(named) + 1})" if unnumbered in named else unnumbered] = fit
-    return named
 
 
 def average(fits: Mapping[str, Any] | Sequence[Any]) -> Average:

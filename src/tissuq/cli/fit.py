@@ -188,12 +188,12 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     target = call.target(Path("runs") / Path(settings.files[0]).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
     how, running = call.how, dict[str, Any]()
-    of_solver = ("max_jobs", "timeout", "retries", "keep", "abaqus")
+    of_solver = ("timeout", "retries", "keep", "abaqus")
     workers = how.workers
     if settings.models:
         workers = how.max_jobs or os.cpu_count() or 1
-        running = {name: getattr(how, name) for name in of_solver[1:]}
-    elif idle := [f"--{name.replace('_', '-')}" for name in of_solver if name in how.model_fields_set]:
+        running = {name: getattr(how, name) for name in of_solver}
+    elif idle := [f"--{name.replace('_', '-')}" for name in ("max_jobs", *of_solver) if name in how.model_fields_set]:
         raise InputError(f"{' and '.join(idle)}: only a finite-element model (--model) has a solver; leave it out.")
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
         study = run_calibration(settings, call.beside, runs_in=runs_in, workers=workers, step=step, **running)

@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from tissuq.assessment.comparison import named_fits
+from tissuq.assessment.named_fits import named_fits
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode

@@ -269,8 +269,8 @@ def priors_of(
     priors: dict[str, Prior] = {}
     lines: dict[str, FloatArray] = {}
     material = posterior.model.material.plain
-    cut = [of.symbol for of in material.parameters if of.symbol in symbols_in(posterior.warnings, "prior-bound")]
-    if cut:
+    bounded = symbols_in(posterior.warnings, "prior-bound")
+    if cut := [parameter.symbol for parameter in material.parameters if parameter.symbol in bounded]:
         raise InputError(
             f"a bound of its prior cuts the posterior of {' and that of '.join(cut)}, so that it is not the data's: "
             f"fit the tests with a wider one, as --prior {cut[0]}=uniform(...), or give priors yourself in place of "

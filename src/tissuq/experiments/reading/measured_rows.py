@@ -181,8 +181,8 @@ class MeasuredRows:
         InputError
             When this is not a list of lines, or some of them hold no row that is used.
         """
-        own = [*self.table.lines, *absent]
-        is_asked = rows_in(lines, [*own, *self.table.other_tests], self.table.file)[: len(own)]
+        of_test = [*self.table.lines, *absent]
+        is_asked = rows_in(lines, [*of_test, *self.table.other_tests], self.table.file)[: len(of_test)]
         if not is_asked.any():
             return self
         is_left_out = is_asked[: len(self)]
