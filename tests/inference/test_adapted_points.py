@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from marks import slow_but
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.adapted_points import AdaptedPoints, _Density
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
+from tissuq.inference.proposal_mixture import weighted_points
 
 STRETCH = np.linspace(0.75, 1.6, 12)
 DATA = tq.Experiment(
@@ -81,12 +84,13 @@ def test_points_lie_around_the_highest_peak_and_not_around_the_first_that_is_met
     assert posterior.marginals["k2"].hdi()[1] > 2.65
 
 
-def test_points_that_still_move_along_a_ridge_go_on():
+@pytest.mark.parametrize("seed", slow_but([2], [2, 3, 4]))
+def test_points_lie_all_along_a_narrow_bent_ridge(seed):
     """Stress on a grid of k2 and kappa, C10 and k1 (of two coincident families) integrated; their prior is 1 / k1."""
     law, truth = "neo-hookean+dispersed-fibres@0", {"C10": 0.01, "k1": 0.02, "k2": 2.0, "kappa": 0.02}
     stretch, sd = np.linspace(1.02, 1.4, 20), 1e-4
-    data = tq.simulate(law, truth, stretch, noise_sd=sd, seed=2)
-    k2, kappa = (axis.ravel() for axis in np.meshgrid(np.linspace(1.2, 3.2, 101), np.linspace(0, 0.1, 101)))
+    data = tq.simulate(law, truth, stretch, noise_sd=sd, seed=seed)
+    k2, kappa = (axis.ravel() for axis in np.meshgrid(np.linspace(0.8, 3.6, 401), np.linspace(0, 0.2, 201)))
     k2, spread = k2[:, None], kappa[:, None]
     strain = spread * (stretch**2 + 2 / stretch - 3) + (1 - 3 * spread) * (stretch**2 - 1)
     slope = spread * (2 * stretch - 2 / stretch**2) + (1 - 3 * spread) * 2 * stretch
@@ -100,7 +104,23 @@ def test_points_that_still_move_along_a_ridge_go_on():
     mean = float(weights @ kappa / weights.sum())
     spread_of_kappa = float(np.sqrt(weights @ (kappa - mean) ** 2 / weights.sum()))
     found = tq.fit(data, material=law, discrepancy="none", noise_sd=sd).marginals["kappa"]
-    assert found.mean == pytest.approx(mean, abs=spread_of_kappa)
+    assert found.mean == pytest.approx(mean, abs=0.3 * spread_of_kappa)
+    assert found.sd == pytest.approx(spread_of_kappa, rel=0.2)
+
+
+def test_rounds_go_on_while_the_mass_still_grows(monkeypatch):
+    """The mass of the first rounds is made less, by 9 % from one to the next, as along a ridge not yet met whole."""
+    problem = model(material="ogden-1", discrepancy="none")
+    (truth,) = AdaptedPoints().solve([problem])
+
+    def growing(*args, **options):
+        missing = itertools.chain([0.36, 0.27, 0.18, 0.09], itertools.repeat(0.0))
+        for (points, log_weights), less in zip(weighted_points(*args, **options), missing, strict=False):
+            yield points, log_weights - less
+
+    monkeypatch.setattr("tissuq.inference.enumerators.adapted_points.weighted_points", growing)
+    (late,) = AdaptedPoints().solve([problem])
+    assert late.log_evidence == pytest.approx(truth.log_evidence, abs=0.03)
 
 
 def test_points_that_are_not_effective_are_said(monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from math import log
 
@@ -20,7 +21,7 @@ from tissuq.inference.proposal_mixture import Mixture, fitted, weighted_points
 from tissuq.inference.quasi_monte_carlo import Proposal, effective, even_points, log_normal
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
-from tissuq.model.scales import MAX_SCORE, at_scores
+from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
@@ -34,6 +35,12 @@ MIN_ROUNDS, MAX_ROUNDS, MAX_CHANGE = 4, 40, 0.1
 """Rounds at least, of fewer where a similar model is known, and at most, and change of the log of the mass in these."""
 SURVEY_POINTS, CLIMBS, LEAST_DISTANCE = 1024, 8, 0.7
 """Points of the prior among which climbs to peaks begin, how many do, and how far apart."""
+COINCIDENT = 0.5
+"""Distance of two peaks, in widths of one, below which they are the same."""
+MAX_CLIMBS, CLIMBED_HEIGHT = 8, 0.5
+"""Climbs one after another, each in steps of the width where the last ended, and what the last gains of log density."""
+UNBOUNDED = np.array(np.inf)
+"""End of coordinates that are normal under the prior."""
 RELEVANT_LOG_DROP = 20.0
 """Logarithm of the mass of a peak below the largest at which it does not count."""
 NEGLIGIBLE_WEIGHT = 1e-9
@@ -126,7 +133,11 @@ class AdaptedPoints:
 
 
 def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> Mixture:
-    """Return a mixture with a part around each peak that is reached from good points of the prior far apart."""
+    """Return a mixture with a part around each peak that is reached from good points of the prior far apart.
+
+    And around each place on the way, where a climb along a narrow bent ridge began again in its width there: such a
+    ridge has parts all along.
+    """
     from scipy.special import ndtri
 
     points = ndtri(even_points(dimension, SURVEY_POINTS))
@@ -138,15 +149,35 @@ def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: in
         if len(feet) == CLIMBS:
             break
 
-    def evaluate(stencils: FloatArray) -> FloatArray:
-        return log_density(stencils.reshape(-1, dimension)).reshape(stencils.shape[:-1])
+    peaks, roots = np.array(feet), np.repeat(np.eye(dimension)[None], len(feet), axis=0)
+    last_heights, parts = np.full(len(feet), -np.inf), list[tuple[float, Proposal]]()
+    for _ in range(MAX_CLIMBS):
+        evaluate, at_peaks = partial(_along, log_density, peaks, roots), np.zeros((1, *peaks.shape))
+        steps, heights, curvatures = (ends[0] for ends in climb(evaluate, at_peaks, -UNBOUNDED, UNBOUNDED))
+        peaks = peaks + (roots @ steps[:, :, None])[:, :, 0]
+        covariances = roots @ np.linalg.inv(curvatures) @ roots.swapaxes(1, 2)
+        roots = np.asarray(np.linalg.cholesky(covariances), dtype=np.float64)
+        log_masses = heights + 0.5 * np.linalg.slogdet(covariances)[1]
+        parts += zip(log_masses.tolist(), map(Proposal, peaks, roots), strict=True)
+        is_relevant = log_masses >= log_masses.max() - RELEVANT_LOG_DROP
+        if not (is_relevant & (heights > last_heights + CLIMBED_HEIGHT)).any():
+            break
+        last_heights = heights
+    largest = max(log_mass for log_mass, _ in parts)
+    relevant = list[Proposal]()
+    for log_mass, part in parts:
+        scores = [np.linalg.solve(other.root, part.mean - other.mean) for other in relevant]
+        if log_mass >= largest - RELEVANT_LOG_DROP and all(np.linalg.norm(score) > COINCIDENT for score in scores):
+            relevant.append(part)
+    return [(1 / len(relevant), part) for part in relevant]
 
-    peaks, heights, curvatures = climb(evaluate, np.array(feet)[None], np.array(-MAX_SCORE), np.array(MAX_SCORE))
-    covariances = np.linalg.inv(curvatures[0])
-    log_masses = heights[0] + 0.5 * np.linalg.slogdet(covariances)[1]
-    matter = np.flatnonzero(log_masses >= log_masses.max() - RELEVANT_LOG_DROP)
-    roots = np.linalg.cholesky(covariances)
-    return [(1 / len(matter), Proposal(peaks[0, peak], roots[peak])) for peak in matter]
+
+def _along(
+    log_density: Callable[[FloatArray], FloatArray], centres: FloatArray, roots: FloatArray, steps: FloatArray
+) -> FloatArray:
+    """Return the log density (1, K, P) at steps (1, K, P, d) from K centres, in units of the roots' widths there."""
+    points = centres[:, None] + steps[0] @ roots.swapaxes(1, 2)
+    return log_density(points.reshape(-1, centres.shape[1])).reshape(steps.shape[:-1])
 
 
 class _Density:
