@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -333,6 +334,23 @@ def test_priors_of_the_noise_that_exclude_some_ratios_leave_the_rest():
     assert np.isfinite(found.log_evidence_error)
     assert found.solution.draws["noise_share"].min() >= 0.02
     assert found.solution.draws["noise_sd"].min() >= 0.05
+
+
+@pytest.mark.parametrize(("of_largest", "is_known"), [(False, True), (True, False)])
+def test_sums_that_end_too_early_leave_the_evidence_unknown_where_they_hold_mass(of_largest, is_known, monkeypatch):
+    """As at exponents far from the data, where the amplitudes that would reconcile both lie beyond their lattice."""
+
+    def unknown_at_one(model, guide):
+        nodes, log_weights, error = weighted_nodes(model, guide)
+        log_masses = log_weights + [node.log_mass for node in nodes]
+        index = int(log_masses.argmax() if of_largest else log_masses.argmin())
+        nodes[index] = replace(nodes[index], error=np.inf)
+        log_weights[index] -= 0 if of_largest else 20
+        return nodes, log_weights, error
+
+    monkeypatch.setattr("tissuq.inference.enumerators.amplitude_lattice.weighted_nodes", unknown_at_one)
+    found = fit(material="ogden-1", noise_sd=NOISE_SD, priors={})
+    assert np.isfinite(found.log_evidence_error) == is_known
 
 
 def test_a_prior_far_from_the_data_is_said():

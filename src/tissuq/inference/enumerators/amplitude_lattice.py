@@ -182,6 +182,7 @@ class _EnergySums:
         top = masses.max()
         total = np.exp(masses - top).sum()
         self._points, self._weights = points, np.exp(masses - top) / total
+        self._shares = np.bincount(self._node, self._weights, minlength=len(nodes))
         settings = self._settings(points, self._node)
         gaussians = GaussianMixture(self._weights, settings, mean, root)
         self._truncated = TruncatedMixture.of(gaussians, mass_outside, self._box)
@@ -189,8 +190,10 @@ class _EnergySums:
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
-            of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
-            self._evidence = evidence, float(error + of_sums + self._weights @ error_of_mass + NEGLIGIBLE_SHARE)
+            # Nodes far from the posterior may end within large amplitudes: what is unknown there does not matter.
+            matters = self._shares > NEGLIGIBLE_SHARE
+            of_nodes = np.linalg.norm(self._shares[matters] * np.array([node.error for node in nodes])[matters])
+            self._evidence = evidence, float(error + of_nodes + self._weights @ error_of_mass + NEGLIGIBLE_SHARE)
 
     def solution(self, components: int, seed: int) -> Solution:
         """Return the posterior; in its mixture the weights of the discrepancy follow the material's parameters."""
@@ -217,10 +220,9 @@ class _EnergySums:
             f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
             f"{len(model.energy_members)} energies and lattices of {inner}"
         )
-        shares = np.bincount(self._node, self._weights, minlength=len(self._nodes))
-        effective = 1 / (shares @ shares)
+        effective = 1 / (self._shares @ self._shares)
         return done + (
-            f", and over {len(shares)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
+            f", and over {len(self._nodes)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
         )
 
     def _represented(self, power: float, count: int, few: int | None = None) -> GaussianMixture:
