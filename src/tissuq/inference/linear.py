@@ -157,23 +157,23 @@ def integrated(precision: Any, pull: Any, size: Any) -> Integrated:
 def _few_integrated(precision: FloatArray, pull: FloatArray, size: FloatArray) -> Integrated:
     """Return `integrated` of few parameters, entry by entry: for small matrices the library's overhead is most."""
     p = precision.shape[-1]
-    triangle: dict[tuple[int, int], FloatArray] = {}
-    inverse = np.zeros(precision.shape)
-    log_volume = np.zeros(precision.shape[:-2])
+    triangle, inverse = dict[tuple[int, int], FloatArray](), dict[tuple[int, int], FloatArray]()
+    log_volume, root = np.zeros(precision.shape[:-2]), np.zeros(precision.shape)
     for i in range(p):
         for j in range(i):
             partial_sum = sum(triangle[i, k] * triangle[j, k] for k in range(j))
-            triangle[i, j] = (precision[..., i, j] - partial_sum) * inverse[..., j, j]
+            triangle[i, j] = (precision[..., i, j] - partial_sum) * inverse[j, j]
         square = precision[..., i, i] - sum(triangle[i, k] ** 2 for k in range(i))
         if (square <= 0).any():  # what is no number stays none, as with the library
             raise np.linalg.LinAlgError("the precision of the linear parameters is not positive")
-        inverse[..., i, i] = 1 / np.sqrt(square)
+        inverse[i, i] = root[..., i, i] = 1 / np.sqrt(square)
         log_volume -= 0.5 * np.log(square)
         for j in range(i):
-            partial_sum = sum(triangle[i, k] * inverse[..., k, j] for k in range(j, i))
-            inverse[..., i, j] = -partial_sum * inverse[..., i, i]
-    scores = inverse @ pull
-    return Integrated(log_volume, size - (scores**2).sum(axis=-2), inverse.swapaxes(-1, -2), scores)
+            partial_sum = sum(triangle[i, k] * inverse[k, j] for k in range(j, i))
+            inverse[i, j] = root[..., j, i] = -partial_sum * inverse[i, i]
+    scores = [sum(inverse[i, k][..., None] * pull[..., k, :] for k in range(i + 1)) for i in range(p)]
+    misfit = size - sum(score**2 for score in scores)
+    return Integrated(log_volume, misfit, root, np.stack(scores, axis=-2))
 
 
 def condition(

@@ -345,16 +345,15 @@ def linear_at(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[
     index : int
         Of the data set in the lattices.
     points : Points
+        Those of one lattice after another.
     """
-    p = lattices[0].parameters
-    scores, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
-    order = np.argsort(points.lattice, kind="stable")
-    ends = np.searchsorted(points.lattice[order], np.arange(len(lattices) + 1))
-    for lattice, start, end in zip(lattices, ends[:-1], ends[1:], strict=True):
-        if end > start:
-            rows = order[start:end]
-            places = points.second_index[rows], points.first_index[rows]
-            scores[rows], root[rows] = lattice.scores_and_roots(index, *places)
+    ends = np.searchsorted(points.lattice, np.arange(len(lattices) + 1))
+    blocks = [
+        lattice.scores_and_roots(index, points.second_index[start:end], points.first_index[start:end])
+        for lattice, start, end in zip(lattices, ends[:-1], ends[1:], strict=True)
+        if end > start or not len(points.lattice)
+    ]
+    scores, root = (np.concatenate(arrays) for arrays in zip(*blocks, strict=True))
     return lattices[0].linear(index, scores, root)
 
 
@@ -422,8 +421,10 @@ def _masses(point_sets: Sequence[Points]) -> list[FloatArray]:
 
 def _least_that_matters(mass: FloatArray) -> float:
     """Return the mass below which points hold next to nothing together."""
-    order = np.sort(mass)
-    return float(order[np.searchsorted(np.cumsum(order), NEGLIGIBLE_SHARE * order.sum())])
+    negligible = NEGLIGIBLE_SHARE * mass.sum()
+    is_tiny = mass < negligible / len(mass)  # which all together are no more
+    order = np.sort(mass[~is_tiny])
+    return float(order[np.searchsorted(np.cumsum(order), negligible - mass[is_tiny].sum())])
 
 
 @lru_cache(maxsize=64)
