@@ -17,6 +17,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, material_named, standard_name
 from tissuq.model.discrepancy import Auto, Discrepancy, NoDiscrepancy
+from tissuq.parameters.checks import checked_path
 from tissuq.parameters.priors import LogNormal, Normal, Prior
 from tissuq.posterior.archive import read_modes
 from tissuq.posterior.posterior import Posterior
@@ -63,7 +64,8 @@ def load(
     >>> posterior = tq.load("runs/brain", discrepancy="auto")  # doctest: +SKIP
     >>> posterior = tq.load("runs/laws", material="gent")  # doctest: +SKIP
     """
-    file, law = Path(path), material if isinstance(material, Material) else None
+    file = checked_path(path, "a run folder ('runs/specimen') or the file of a posterior")
+    law = material if isinstance(material, Material) else None
     user_discrepancy = discrepancy if isinstance(discrepancy, Discrepancy) else None
     posterior = Posterior.load(file if file.is_file() else _file_in(file, discrepancy, material), law, user_discrepancy)
     if isinstance(material, str) and standard_name(material) != posterior.model.material.name:
