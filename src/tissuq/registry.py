@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from inspect import isabstract
 from typing import Any, TypeVar
+from warnings import warn
 
 from tissuq.errors import ModelError, TissuqError
 
@@ -72,7 +73,7 @@ def plugins(base: type[T], name: str | None = None) -> list[type[T]]:
     Raises
     ------
     ModelError
-        When one of them cannot be used.
+        As `load_plugins`.
     """
 
     def accept(plugin: Any, source: str) -> type[T]:
@@ -95,20 +96,31 @@ def _required(base: type) -> list[str]:
 def load_plugins(group: str, accept: Callable[[Any, str], T], name: str | None = None) -> list[T]:
     """Return the objects under a group of entry points, each as ``accept`` returns it for the object and its source.
 
+    Of a whole group, one that cannot be loaded is warned of and left out, so that it does not take the others away.
+
     Raises
     ------
     ModelError
-        When one of them cannot be loaded, or is not accepted.
+        When the one of that name cannot be loaded, or one is not accepted.
     """
-    points = entry_points(group=group) if name is None else entry_points(group=group, name=name)
-    return [_loaded(point, accept) for point in points]
+    accepted = []
+    for point in entry_points(group=group) if name is None else entry_points(group=group, name=name):
+        try:
+            loaded = point.load()
+        except Exception as error:
+            if name is not None:
+                raise _unusable(point, error) from error
+            warn(str(_unusable(point, error)), stacklevel=2)
+            continue
+        try:
+            accepted.append(accept(loaded, point.value))
+        except Exception as error:
+            raise _unusable(point, error) from error
+    return accepted
 
 
-def _loaded(point: EntryPoint, accept: Callable[[Any, str], T]) -> T:
-    try:
-        return accept(point.load(), point.value)
-    except Exception as error:
-        raise ModelError(
-            f"'{point.name}' of another package ({point.group}: {point.value}) cannot be used: {error}. Repair or "
-            "uninstall that package."
-        ) from error
+def _unusable(point: EntryPoint, error: Exception) -> ModelError:
+    return ModelError(
+        f"'{point.name}' of another package ({point.group}: {point.value}) cannot be used: {error}. Repair or "
+        "uninstall that package."
+    )

@@ -84,6 +84,8 @@ def test_cards_say_what_the_fit_says_of_finite_elements(cli, here, run):
         (["--discrepancy", "gp"], "is an error of the measured stress"),
         (["--discrepancy", "yeoh"], "choose one of auto, gp, none"),
         (["--format", "nastran"], "no format of cards named 'nastran'"),
+        (["--number", "3"], "--number: cards of the format 'abaqus' have none"),
+        (["--number", "3", "--name", "X", "--format", "table"], "--name and --number: tables of the format 'table'"),
         (["--unit", "psi"], "MPa, kPa, Pa"),
         (["--law", "gent"], "no law 'gent'"),
         (["--draws", "0"], "one draw or more"),
@@ -106,6 +108,15 @@ def test_what_cannot_be_is_refused_and_nothing_written(cli, here, run, options, 
     assert words in said.err
     assert "Traceback" not in said.err
     assert tree(here) == before
+
+
+def test_tables_are_called_so(cli, here, run):
+    said = cli("export", run, "--discrepancy", "none", "--draws", 2, "--format", "table")
+    assert said.status == 0, said.err
+    assert "Tables: cards/specimen-table/draw-1.csv" in said.out
+    assert "card " not in said.out
+    assert "In the tables: calibrated stretches" in said.out
+    assert "card" not in (here / "cards" / "specimen-table" / "draw-1.csv").read_text()
 
 
 def test_cards_are_never_overwritten_unasked(cli, here, run):

@@ -255,3 +255,13 @@ def test_sizes_that_no_file_needs_are_refused(cli, files):
     said = cli("fit", *files, "--length", "10 mm", *ALONE)
     assert said.status == 2
     assert "b.csv, column 'stretch' is read as stretch, which needs no length" in said.err
+
+
+def test_a_specimen_that_nothing_is_told_apart_by_is_refused(cli, here):
+    rows = [f"{name},{1 + k / 20},{k * size}" for name, size in (("A", 1), ("B", 2)) for k in range(12)]
+    (here / "two.csv").write_text("specimen,stretch,stress [kPa]\n" + "\n".join(rows) + "\n")
+    (here / "one.csv").write_text("stretch,stress [kPa]\n" + "".join(f"{1 + k / 20},{k}\n" for k in range(12)))
+    said = cli("fit", "two.csv", "--specimen", "A")
+    assert (said.status, "has the specimens A, B: to fit one alone give --only COLUMN=A" in said.err) == (2, True)
+    said = cli("fit", "one.csv", "--specimen", "A")
+    assert (said.status, "'one.csv' is of one test; leave it out" in said.err) == (2, True)

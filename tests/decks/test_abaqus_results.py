@@ -183,7 +183,7 @@ def test_a_field_that_was_not_written_is_told_in_the_words_of_abaqus(abaqus, tmp
     ("program", "words"),
     [
         ("no-such-program", "there is no program 'no-such-program' to run.*--abaqus"),
-        ("false", "cannot be opened by 'false python'"),
+        ("false", r"cannot be opened by 'false python'.* It said nothing \(exit status 1\)"),
     ],
 )
 def test_a_program_that_cannot_open_it_is_named(tmp_path, program, words):

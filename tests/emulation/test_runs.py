@@ -290,6 +290,13 @@ def test_runs_of_another_model_or_of_other_controls_are_not_taken(tmp_path):
         runs_of(as_forward(neo_hooke), PROBLEM, tmp_path / "mine", 1, silent).__enter__()
 
 
+def test_a_folder_that_a_killed_process_had_just_made_is_taken(tmp_path):
+    (tmp_path / "about.json.new").write_text('{"mod')
+    with runs_of(as_forward(neo_hooke), PROBLEM, tmp_path, 1, silent) as run:
+        assert not run(POINTS).failed.any()
+    assert not (tmp_path / "about.json.new").exists()
+
+
 def test_a_folder_without_any_run_does_not_stay(tmp_path):
     with pytest.raises(InputError, match="15 measurements"):
         tq.calibrate(DEPTH, DEPTH, lambda parameters: [1.0], PRIORS, folder=tmp_path / "runs")

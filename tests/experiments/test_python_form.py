@@ -133,3 +133,20 @@ def test_commands_and_sentences_stay_as_they_are():
         "tissuq population FILE --specimen-column 'Protocol' fits each; 1--2 is none. Give --zero, or --branch loading."
     )
     assert in_python(text) == text.replace("--zero", "zero").replace("--branch loading", 'branch="loading"')
+
+
+@pytest.mark.parametrize(
+    ("call", "given", "words"),
+    [
+        (tq.load, None, "a run folder .* is needed, not None"),
+        (tq.predict_run, 3, "a run folder .* is needed, not 3"),
+        (tq.Posterior.load, None, "the file of a posterior .* is needed, not None"),
+        (tq.load_material, None, "'None' does not name a law in a file: write path.py:Name"),
+        (tq.fit_many, 3, "a list of data sets is needed, .* not int"),
+        (tq.fit_many, "tests.csv", "a list of data sets is needed, .* not str"),
+        (tq.held_out_tests, 3, "measurements are needed: .* Not 3"),
+    ],
+)
+def test_what_is_no_file_folder_or_list_is_refused_in_a_sentence(call, given, words):
+    with pytest.raises(tq.InputError, match=words):
+        call(given)

@@ -6,14 +6,24 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.experiments.units import stress_unit
 from tissuq.report.measured import specimens_section
 
 
 @pytest.mark.parametrize(
     ("discrepancy", "noise_sd", "words"),
     [
-        ("none", 1e-5, "the material is right. Noise: known standard deviation: 1e-05."),
-        ("gp", "unknown", "is a Gaussian process with the covariance c^2 exp(-(l - l')^2 / (2 psi^2)) ('gp' of tissuq"),
+        ("none", {"L1": 1e-5, "L2": 1e-5}, "the material is right. Noise: known standard deviation 0.01 kPa."),
+        (
+            "none",
+            {"L1": 1e-5, "L2": "unknown"},
+            "Noise: of L1: known standard deviation 0.01 kPa; of L2: unknown standard deviation",
+        ),
+        (
+            "gp",
+            dict.fromkeys(("L1", "L2"), "unknown"),
+            "is a Gaussian process with the covariance c^2 exp(-(l - l')^2 / (2 psi^2)) ('gp' of tissuq",
+        ),
     ],
 )
 def test_a_page_of_specimens_says_how_they_were_read_and_what_was_fitted(tmp_path, discrepancy, noise_sd, words):
@@ -24,8 +34,8 @@ def test_a_page_of_specimens_says_how_they_were_read_and_what_was_fitted(tmp_pat
         rows = [f"{a:.4f},{1e3 * b:.5f}" for a, b in zip(stretch, stretch - stretch**-2, strict=True)]
         path.write_text("\n".join(["stretch,stress (kPa)", *rows]))
         tests[name] = [tq.read(path)]
-    model = tq.fit(tests["L1"], discrepancy=discrepancy, noise_sd=noise_sd).model
-    sources, law = specimens_section(tests, model, noise_sd).blocks
+    fits = {name: tq.fit(test, discrepancy=discrepancy, noise_sd=noise_sd[name]) for name, test in tests.items()}
+    sources, law = specimens_section(tests, fits, stress_unit("kPa")).blocks
     assert [source.partition(": ")[0] for source in sources] == ["**L1**", "**L2**"]
     assert "engineering stress from column 'stress (kPa)' in kPa" in sources[1]
     assert "W = C10 (I1 - 3) (Treloar 1943), was fitted to every specimen." in law

@@ -76,6 +76,20 @@ def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:
     return tuple(s for s, size in zip(model.column_symbols, moduli, strict=True) if size > 1e-6 * moduli.max())
 
 
+def positive_symbols(model: StatisticalModel) -> tuple[str, ...]:
+    """Return the parameters of the material that are positive: of a population and as priors, their logarithms count.
+
+    A parameter that alone is the initial shear modulus (mu1 of one Ogden term, negative beside others at times) is
+    taken to be one.
+    """
+    alone = modulus_symbols(model)
+    return tuple(
+        parameter.symbol
+        for parameter in model.material.plain.parameters
+        if (parameter.support[0] >= 0 and np.isinf(parameter.support[1])) or alone == (parameter.symbol,)
+    )
+
+
 def _moduli(model: StatisticalModel, bent: FloatArray) -> FloatArray:
     """Return the initial shear moduli (M, k) of unit `column_symbols` at exponents (M, s); zero for a discrepancy's."""
     distinct, group = np.unique(bent, axis=0, return_inverse=True)

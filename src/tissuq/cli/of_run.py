@@ -106,7 +106,9 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
 
     settings = call.settings
     run = Path(settings.run)
-    card_format(settings.format)
+    code = card_format(settings.format)
+    if idle := [f"--{name}" for name in code.unused if name in call.stated]:
+        raise InputError(f"{' and '.join(idle)}: {code.kind} of the format '{code.name}' have none; leave it out.")
     target = call.target(Path("cards") / f"{run.resolve().name}-{settings.format}", apart_from=run)
     of_cards = vars(settings.card_settings(name=settings.name, number=settings.number))
     posterior = load(run, settings.discrepancy, settings.law_of(call.law))
@@ -117,9 +119,10 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     cards = write_cards(ensemble, target, settings.format, force=call.how.force, **of_cards | {"source": source})
     if use := said.use:
         print_uses([{"purpose": use.purpose, "verdict": use.verdict, "reason": use.reason}])
-    print_explanations([*cards.warnings, f"In the cards: {calibrated_stretches(ensemble)}."])
+    print_explanations([*cards.warnings, f"In the {code.kind}: {calibrated_stretches(ensemble)}."])
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]
-    print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
+    last = f" to {files[-1]}" if len(files) > 1 else ""
+    print(f"{code.kind.capitalize()}: {target / files[0]}{last}, {INDEX}")
     print(f"The most typical draw, nearest to the median stresses: {files[distances.index(min(distances))]}")
     if said.advice:
         print_next(said.advice)

@@ -274,7 +274,8 @@ class AbaqusResults(ResultFile):
         if done.returncode or not target.is_file():
             lines = f"{done.stdout}\n{done.stderr}".strip().splitlines()[-LAST_LINES:]
             said = "".join(f"\n    {line}" for line in lines)
-            raise InputError(f"{self.label} cannot be opened by '{program} python'. {advice} It said:{said}")
+            said = f"It said:{said}" if said else f"It said nothing (exit status {done.returncode})."
+            raise InputError(f"{self.label} cannot be opened by '{program} python'. {advice} {said}")
 
 
 def _stored(target: Path) -> dict[str, Any] | None:

@@ -166,6 +166,10 @@ class CardFormat(ABC):
     entry_point_group: ClassVar[str] = "tissuq.card_formats"
     name: ClassVar[str]
     description: ClassVar[str]
+    kind: ClassVar[str] = "cards"
+    """What its files are."""
+    unused: ClassVar[tuple[str, ...]] = ()
+    """Settings of cards that its files have no place for."""
 
     @abstractmethod
     def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
@@ -239,7 +243,7 @@ def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
 def calibrated_stretches(ensemble: Ensemble) -> str:
     """Return in words how far draws are known in every loading mode."""
     ends = (f"{mode} {low:.4g} to {high:.4g}" for mode, (low, high) in ensemble.ranges.items())
-    return f"calibrated stretches: {', '.join(ends)}; beyond, the card is an extrapolation"
+    return f"calibrated stretches: {', '.join(ends)}; beyond, the material is an extrapolation"
 
 
 def ensemble_sentences(ensemble: Ensemble) -> Iterator[str]:

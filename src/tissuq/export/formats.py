@@ -58,6 +58,7 @@ class Abaqus(FECode):
 
     name = "abaqus"
     description = "Abaqus *HYPERELASTIC include files"
+    unused = ("number",)
     suffix = ".inp"
     comment = ("** ", "")
     checked = "written after the manual of Abaqus, not run there; CalculiX, which reads the same keyword, was run"

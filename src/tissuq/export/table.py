@@ -34,6 +34,8 @@ class Table(CardFormat):
 
     name = "table"
     description = "CSV tables of W1 and W2 against the invariants, exact for every draw"
+    kind = "tables"
+    unused = ("name", "number")
 
     def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
         if not ensemble[0].is_isotropic:

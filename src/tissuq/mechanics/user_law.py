@@ -201,7 +201,7 @@ class UserCode(NamedTuple):
     @classmethod
     def named(cls, text: str) -> Self | None:
         """Return what a text names; None where that is nothing in a file."""
-        match = LAW.fullmatch(text)
+        match = LAW.fullmatch(text) if isinstance(text, str) else None
         return cls(Path(match["path"]), match["name"]) if match else None
 
     @property

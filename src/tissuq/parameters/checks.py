@@ -1,9 +1,11 @@
-"""What arguments of many functions may be: seeds that generators take and files hold, probabilities, priors."""
+"""What arguments of many functions may be: seeds that generators take and files hold, probabilities, priors, paths."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from numbers import Integral
+from pathlib import Path
 
 from tissuq.errors import InputError
 
@@ -44,3 +46,16 @@ def check_priors(priors: object) -> None:
     """
     if not isinstance(priors, Mapping):
         raise InputError(f"priors must be by parameter, such as {{'C10': tissuq.Uniform(0, 5)}}, not {priors!r}.")
+
+
+def checked_path(path: object, what: str) -> Path:
+    """Return the path of something saved, or refuse what is none.
+
+    Raises
+    ------
+    InputError
+        When it is neither text nor a path; the message says what is needed.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"{what} is needed, not {path!r:.80}.")
+    return Path(path)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tissuq.arrays import BoolArray, FloatArray, IndexArray
-from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.modulus import positive_symbols
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import quasi_random
 from tissuq.inference.solution import Solution
@@ -307,15 +307,8 @@ class Coordinates:
 
 
 def coordinates_of(posteriors: Sequence[Posterior], symbols: Sequence[str]) -> Coordinates:
-    """Return the coordinates of pooled parameters, with origin and scale from the specimens' separate fits.
-
-    A parameter that alone is the initial shear modulus (mu1 of one Ogden term, negative beside others at times) is
-    taken to be positive.
-    """
-    model = posteriors[0].model
-    parameters, of_modulus = {p.symbol: p for p in model.material.parameters}, modulus_symbols(model)
-    supports = [(0.0, np.inf) if of_modulus == (s,) else parameters[s].support for s in symbols]
-    is_log = np.array([low >= 0 and np.isinf(high) for low, high in supports])
+    """Return the coordinates of pooled parameters, with origin and scale from the specimens' separate fits."""
+    is_log = np.isin(symbols, positive_symbols(posteriors[0].model))
     medians = np.array([[float(p.marginals[s].quantile(0.5)) for s in symbols] for p in posteriors])
     sizes = np.array([[np.hypot(p.marginals[s].mean, p.marginals[s].sd) for s in symbols] for p in posteriors])
     scale = np.where(is_log, 1.0, np.median(sizes, axis=0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Unpack
 
@@ -13,6 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.experiments.reading.options import PythonOptions
+from tissuq.experiments.reading.python_form import is_to_be_read
 from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
@@ -171,6 +172,11 @@ def fit_many(
     list of Posterior
         In the order of the experiments.
 
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        As `fit`; or when there is no list.
+
     Examples
     --------
     >>> import tissuq as tq
@@ -181,6 +187,11 @@ def fit_many(
     >>> len(held)
     20
     """
+    if is_to_be_read(datasets) or not isinstance(datasets, Iterable):
+        raise InputError(
+            "a list of data sets is needed, each as for tissuq.fit, which fits a single one; not "
+            f"{type(datasets).__name__}."
+        )
     _refuse_several(material, priors, reading.get("mode"))
     experiments = [measurements(data, OPTIONS, **reading) for data in datasets]
     if isinstance(tolerances, str):

@@ -30,6 +30,7 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
 from tissuq.next_test.candidates import Target
+from tissuq.parameters.checks import checked_path
 from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.drawn_materials import Sampling, drawn_ensemble
@@ -571,7 +572,9 @@ class Posterior(PosteriorPlots):
         InputError
             When the file holds no posterior or is damaged, or material or discrepancy must be given.
         """
-        return cls(*read_solution(Path(path), material, discrepancy))
+        return cls(
+            *read_solution(checked_path(path, "the file of a posterior ('posterior.nc')"), material, discrepancy)
+        )
 
     def __repr__(self) -> str:
         model = self.model

@@ -85,17 +85,28 @@ def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Secti
     return Section("The data and what intervals include", tuple(blocks))
 
 
-def specimens_section(tests: Mapping[str, Sequence[Experiment]], model: StatisticalModel, noise_sd: object) -> Section:
-    """Return how the files of specimens were read, and as what their stress was taken: of ``model``, one of them."""
+def specimens_section(
+    tests: Mapping[str, Sequence[Experiment]], fits: Mapping[str, Posterior], unit: StressUnit
+) -> Section:
+    """Return how the files of specimens were read, and as what their stress was taken in their separate fits."""
+    model = next(iter(fits.values())).model
     sources = tuple(f"**{name}**: {test.source}." for name, of_one in tests.items() for test in of_one)
     discrepancy = discrepancy_in_words(model, model.discrepancy.name)
-    law = f"{LAW.format(model.material)} to every specimen. {discrepancy} {noise_of_specimens(model, noise_sd)}"
+    law = f"{LAW.format(model.material)} to every specimen. {discrepancy} {noise_of_specimens(fits, unit)}"
     return Section("The data and the model of every specimen", (sources, law))
 
 
-def noise_of_specimens(model: StatisticalModel, noise_sd: object) -> str:
+def noise_of_specimens(fits: Mapping[str, Posterior], unit: StressUnit) -> str:
     """Return what the random errors of measurements of specimens are taken to be."""
-    return f"Noise: {model.noise.description}" + f": {noise_sd}" * (not model.noise.parameters) + "."
+    specimens: dict[str, list[str]] = {}
+    for name, fit in fits.items():
+        noise, text = fit.model.noise, fit.model.noise.description
+        if not noise.parameters:
+            sds = dict.fromkeys(f"{sd / unit.to_mpa:.4g}" for sd in noise.of_tests(fit.model.experiment))
+            text = f"known standard deviation {', '.join(sds)} {unit.name}"
+        specimens.setdefault(text, []).append(name)
+    of_groups = [f"of {', '.join(names)}: {text}" for text, names in specimens.items()]
+    return f"Noise: {'; '.join(of_groups if len(specimens) > 1 else specimens)}."
 
 
 def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:

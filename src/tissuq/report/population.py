@@ -194,7 +194,7 @@ def _sections(
     if tolerances := _tolerances(population):
         sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
         computed += (f"Errors of the specimens' own tests are included (of the first one: {sizes}).",)
-    data = specimens_section(study.tests, next(iter(population.posteriors.values())).model, study.settings.noise_sd)
+    data = specimens_section(study.tests, population.posteriors, study.unit)
     how_computed = Section("How it was computed", (computed,))
     methods = methods_of_population(study, answer)
     return (*sections, Section("How to read it", (HOW_TO_READ,)), how_computed, data, methods)

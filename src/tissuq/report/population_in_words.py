@@ -130,7 +130,7 @@ def methods_of_population(study: PopulationStudy, answer: PopulationAnswer) -> S
             data=f"{len(population.posteriors)} specimens ({modes} tests, {study.measurements} measurements)",
         ),
         discrepancy_in_words(model, study.settings.discrepancy),
-        noise_of_specimens(model, study.settings.noise_sd),
+        noise_of_specimens(population.posteriors, unit),
         WHOLE_TESTS.format(sizes=sizes) if sizes else "",
         FITTED_SEPARATELY,
         between_specimens(study),

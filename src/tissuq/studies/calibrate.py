@@ -35,6 +35,7 @@ from tissuq.studies.stream import (
     read_results,
     run_tasks,
     silent,
+    unfinished,
     write_whole,
 )  # fmt: skip
 
@@ -251,7 +252,7 @@ def _open(folder: Path, model: Forward, problem: Problem) -> None:
                 "another one, or remove it."
             )
         shutil.rmtree(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if folder.exists() and not (folder.is_dir() and {*folder.iterdir()} <= {unfinished(file)}):
         raise InputError(f"'{folder}' is not a folder of forward runs; choose another one.")
     folder.mkdir(parents=True, exist_ok=True)
     write_whole(file, json.dumps(about))

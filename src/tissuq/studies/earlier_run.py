@@ -12,10 +12,12 @@ from warnings import warn
 import numpy as np
 
 from tissuq.arrays import FloatArray
+from tissuq.assessment.modulus import positive_symbols
 from tissuq.errors import InputError
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, material_named, standard_name
 from tissuq.model.discrepancy import Auto, Discrepancy, NoDiscrepancy
+from tissuq.parameters.checks import checked_path
 from tissuq.parameters.priors import LogNormal, Normal, Prior
 from tissuq.posterior.archive import read_modes
 from tissuq.posterior.posterior import Posterior
@@ -62,7 +64,8 @@ def load(
     >>> posterior = tq.load("runs/brain", discrepancy="auto")  # doctest: +SKIP
     >>> posterior = tq.load("runs/laws", material="gent")  # doctest: +SKIP
     """
-    file, law = Path(path), material if isinstance(material, Material) else None
+    file = checked_path(path, "a run folder ('runs/specimen') or the file of a posterior")
+    law = material if isinstance(material, Material) else None
     user_discrepancy = discrepancy if isinstance(discrepancy, Discrepancy) else None
     posterior = Posterior.load(file if file.is_file() else _file_in(file, discrepancy, material), law, user_discrepancy)
     if isinstance(material, str) and standard_name(material) != posterior.model.material.name:
@@ -233,8 +236,8 @@ def priors_of(
 ) -> tuple[dict[str, Prior], dict[tuple[str, str], float]]:
     """Return priors of a law's parameters with mean, sd and correlations of a posterior.
 
-    Positive parameters get a log-normal prior with mean and sd of the logarithms, others a normal one; what the
-    posterior says of a discrepancy or of the noise is left out.
+    Positive parameters get a log-normal prior with mean and sd of the logarithms, as in a population, others a normal
+    one; what the posterior says of a discrepancy or of the noise is left out.
 
     Parameters
     ----------
@@ -276,21 +279,25 @@ def priors_of(
             f"fit the tests with a wider one, as --prior {cut[0]}=uniform(...), or give priors yourself in place of "
             "the run."
         )
+    positive = positive_symbols(posterior.model)
     for parameter in material.parameters:
-        symbol, (low, high) = parameter.symbol, parameter.support
+        symbol, bounds = parameter.symbol, np.array(parameter.support)
         if symbol in stated:
             continue
         scale = to_mpa if parameter.unit else 1.0
         values = np.asarray(draws[symbol], dtype=np.float64).ravel() / scale
-        is_positive = low == 0 and high == np.inf
-        line = np.log(values) if is_positive else values
+        is_log = symbol in positive and bool((values > 0).all())
+        line, ends = values, bounds / scale
+        if is_log:
+            with np.errstate(divide="ignore"):
+                line, ends = np.log(values), np.log(np.maximum(ends, 0.0))
         mean, sd = float(line.mean()), float(line.std())
-        if not is_positive and (mean - FAR * sd < low / scale or mean + FAR * sd > high / scale):
+        if mean - FAR * sd < ends[0] or mean + FAR * sd > ends[1]:
             raise InputError(
                 f"the posterior of {symbol} lies near a bound of the parameter, and no normal prior is like it: give "
                 f"its prior yourself, as --prior {symbol}=uniform(...)."
             )
-        priors[symbol] = LogNormal(float(np.exp(mean)), sd) if is_positive else Normal(mean, sd)
+        priors[symbol] = LogNormal(float(np.exp(mean)), sd) if is_log else Normal(mean, sd)
         lines[symbol] = line
     correlations = {
         (one, other): correlation

@@ -106,9 +106,14 @@ def measured(
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
                 raise InputError(_too_many(option, stated, "one test", "give it once"))
+        if specimens:
+            raise InputError(f"--specimen {specimens[0]}: it tells tests of one specimen from others, and '{files[0]}' "
+                             "is of one test; leave it out.")  # fmt: skip
         return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(readings)
     if len(tests) > len(files):
         say("\n".join([*lines_of_tests(list(map(Inspection.of, readings))), ""]))
+    if len(files) == 1:
+        _check_whole(files[0], readings, specimens)
     stated_noise = noise if noise and len(noise) > 1 else None
     for name, option, values in (
         ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)
@@ -225,6 +230,16 @@ def run_name(paths: Sequence[Path], config: Path | None, sources: Sequence[Path]
     if len(paths) == 1:
         return paths[0].stem
     return sources[0].stem + (f"-and-{len(sources) - 1}-more" if len(sources) > 1 else "")
+
+
+def _check_whole(file: Path, readings: Sequence[Reading], specimens: Sequence[str] | None) -> None:
+    """Refuse one of the specimens that a file tells apart as the name of them all."""
+    named = dict.fromkeys(reading.experiment.specimen for reading in readings)
+    if specimens and len(specimens) == 1 and specimens[0] in named and len(named) > 1:
+        raise InputError(
+            f"--specimen {specimens[0]} would call all tests so, and '{file}' has the specimens {', '.join(named)}: to "
+            f"fit one alone give --only COLUMN={specimens[0]}, of the column that names them."
+        )
 
 
 def _for_each(counts: Sequence[int], option: str, values: Sequence[Any] | None) -> list[Any]:

@@ -16,6 +16,7 @@ from tissuq.assessment.stability import measured_states
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
+from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import (
@@ -302,7 +303,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     """
     import pandas as pd
 
-    tests = tests.tests if isinstance(tests, Experiment) else tests
+    tests = tests if isinstance(tests, list | tuple) else measurements(tests).tests
     if len(tests) < 2:
         raise InputError("predicting a test from the others needs two or more tests.")
     if isinstance(options.get("noise_sd"), Sequence) and not isinstance(options["noise_sd"], str):
