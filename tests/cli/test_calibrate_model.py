@@ -10,8 +10,8 @@ import pytest
 
 import tissuq as tq
 
-from .conftest import run_in, write_specimen
-from .models import killed_after, rows_of, started, write_model
+from .conftest import rows_of, run_in, write_specimen
+from .models import killed_after, started, write_model
 
 TIMES = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0])
 TRUTH, NOISE_SD = 3.0, 0.1

@@ -1,4 +1,3 @@
-import csv
 import json
 import tomllib
 
@@ -10,18 +9,13 @@ import xarray as xr
 import tissuq as tq
 from marks import slow_but
 
-from .conftest import command, without_wall_times
+from .conftest import command, rows_of, without_wall_times
 
 FORMULATIONS = ["none", "constant", "linear", "quadratic", "mooney-rivlin", "yeoh", "gp"]
 SUMMARY = (
     "formulation,C10_mean,C10_sd,C10_hdi_low,C10_hdi_high,contains_truth,log_evidence,predictive_coverage,"
     "predictive_coverage_model_only,rhat,ess,seconds"
 )
-
-
-def rows_of(file):
-    with file.open(newline="", encoding="utf-8") as lines:
-        return list(csv.DictReader(lines))
 
 
 @pytest.mark.slow
