@@ -64,11 +64,7 @@ class SpecimenStudy:
 
         Those of fits beside the one that answers stand once with their names, and are notes: they concern a comparison.
         """
-        of_main = self.posteriors[self.main].warnings_of_fit
-        of_others = merged(
-            {name: fit.warnings_of_fit for name, fit in self.posteriors.items() if name != self.main}, named=True
-        )
-        beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
+        of_main, beside = self.posteriors[self.main].warnings_of_fit, warnings_beside(self.main, self.posteriors)
         of_evidence = warnings_of_evidence(
             {name: (fit.log_evidence, fit.log_evidence_error) for name, fit in self.posteriors.items()}
         )
@@ -99,6 +95,12 @@ class SpecimenStudy:
     def not_converged(self) -> list[str]:
         """Discrepancies with which sampling has not converged."""
         return [name for name, posterior in self.posteriors.items() if posterior.solution.is_approximate]
+
+
+def warnings_beside(answering: str, fits: Mapping[str, Posterior]) -> list[ResultWarning]:
+    """Return the warnings of other fits than the one that answers, each once with their names: notes, but problems."""
+    of_others = merged({name: fit.warnings_of_fit for name, fit in fits.items() if name != answering}, named=True)
+    return [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
 
 
 def steps_of(settings: SpecimenSettings) -> int:
