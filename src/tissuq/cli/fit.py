@@ -68,8 +68,8 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
         is_comparison = setting_of(call.config, "laws") is not None
     law_settings = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
     laws_of_names = {name: material_named(name, laws=True) for name in names if name != ALL}
-    kind = LawSettings if is_comparison else SpecimenSettings
-    settings = call.loaded_as(kind, ("noise", "noise_sd"), **of_tests, **law_settings)
+    call = replace(call, kind=LawSettings if is_comparison else SpecimenSettings)
+    settings = call.loaded(("noise", "noise_sd"), **of_tests, **law_settings)
     sources = [call.beside / test.file for test in settings.tests or (settings,)]
     if files and call.config:
         _check_same(files[0], sources[0], call.config)
