@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import functools
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
@@ -36,6 +37,7 @@ Cli = Callable[..., Outcome]
 STRETCH = [0.8, 0.9, 1.1, 1.2, 1.3, 1.4]
 STRESS_KPA = [-75.25, -33.06, 27.86, 49.31, 70.83, 88.48]
 """100 (l - l^-2) kPa, C10 = 50 kPa, with errors of +1, 0, 0.5, -1.25, 0 and -0.5 kPa rounded to 0.01."""
+TO_MPA = {"kPa": 1e-3, "Pa": 1e-6, "MPa": 1.0, "N/cm2": 1e-2, "psi": 6.894757293168361e-3}
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -64,6 +66,24 @@ def cli(here, monkeypatch, capsys) -> Cli:
             main()
         said = capsys.readouterr()
         return Outcome(int(end.value.code or 0), said.out, said.err)
+
+    return run
+
+
+@pytest.fixture
+def refused(cli, here) -> Callable[..., Outcome]:
+    """Run a command that says in one message, with these words, what is wrong, and leaves the folder as it was."""
+
+    def run(words: Iterable[str], *arguments: object) -> Outcome:
+        before = tree(here)
+        said = cli(*arguments)
+        assert (said.status, said.out) == (2, "")
+        assert said.err.startswith("tissuq: ")
+        assert said.err.count("\n") == 1
+        for word in words:
+            assert word in " ".join(said.err.split())
+        assert tree(here) == before
+        return said
 
     return run
 
@@ -101,11 +121,35 @@ def run_in(folder: Path, *arguments: object) -> Outcome:
     return Outcome(int(end.value.code or 0), out.getvalue(), err.getvalue())
 
 
+def fitted_in(folder: Path, *options: object) -> Outcome:
+    """Fit a file of six measurements in a folder, with their noise."""
+    write_specimen(folder / "specimen.csv")
+    said = run_in(folder, "fit", "specimen.csv", "--noise-sd", 1, *options)
+    assert said.status == 0, said.err
+    return said
+
+
 def tree(folder: Path) -> dict[str, bytes | None]:
     """Return every file and folder in a folder, hidden ones too, with the bytes of the files."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes() if path.is_file() else None for path in folder.rglob("*")
     }
+
+
+def rows_of(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a table."""
+    with file.open(newline="", encoding="utf-8") as lines:
+        return list(csv.DictReader(lines))
+
+
+def rows_in_mpa(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a table with the cells of stresses in MPa, under the names without a unit."""
+
+    def in_mpa(row: dict[str, str]) -> dict[str, str]:
+        cells = ((*name.removesuffix("]").partition(" ["), value) for name, value in row.items())
+        return {name: str(float(value) * TO_MPA[unit]) if unit else value for name, _, unit, value in cells}
+
+    return list(map(in_mpa, rows_of(file)))
 
 
 def carry_out_paper(folder: Path) -> tuple[Path, Outcome]:
@@ -152,10 +196,8 @@ def whole_paper_run(tmp_path_factory):
 def fit_run(tmp_path_factory):
     """A fit with figures of three discrepancies: its folder and what was said."""
     folder = tmp_path_factory.mktemp("fit")
-    write_specimen(folder / "specimen.csv")
     chosen = [word for name in ("none", "constant", "gp") for word in ("--discrepancy", name)]
-    said = run_in(folder, "fit", "specimen.csv", *chosen, "--noise-sd", 1, "--seed", 3)
-    assert said.status == 0, said.err
+    said = fitted_in(folder, *chosen, "--seed", 3)
     return folder / "runs" / "specimen", said
 
 
@@ -163,10 +205,7 @@ def fit_run(tmp_path_factory):
 def run_without_discrepancy(tmp_path_factory):
     """The run folder of a fit without discrepancy."""
     folder = tmp_path_factory.mktemp("without_discrepancy")
-    write_specimen(folder / "specimen.csv")
-    options = ["--noise-sd", 1, "--discrepancy", "none", "--no-figures", "--out", "run"]
-    said = run_in(folder, "fit", "specimen.csv", *options)
-    assert said.status == 0, said.err
+    fitted_in(folder, "--discrepancy", "none", "--no-figures", "--out", "run")
     return folder / "run"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import shutil
 import signal
@@ -36,12 +35,6 @@ def write_model(folder: Path) -> str:
     shutil.copyfile(STUB, folder / "stub.py")
     (folder / "model.inp").write_text(DECK, encoding="utf-8")
     return f'"{Path(sys.executable).as_posix()}" "{(folder / "stub.py").as_posix()}" {{job}}'
-
-
-def rows_of(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a table."""
-    with path.open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def started(folder: Path) -> list[str]:

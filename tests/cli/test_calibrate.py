@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 import tissuq as tq
 from tissuq.studies.calibration import _are_proportional, _stresses_of_specimens
 
-from .conftest import command, run_in, tree
+from .conftest import command, rows_of, run_in, tree
 
 MODEL = """
 import numpy as np
@@ -121,13 +120,11 @@ def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
     assert list(rows) == ["mu", "b", "c", "psi"]
     assert rows["mu"]["hdi_low"] < 1.1 < rows["mu"]["hdi_high"]
     assert rows["b"]["hdi_low"] < 2.4 < rows["b"]["hdi_high"]
-    with (folder / "run" / "forward_runs.csv").open(newline="") as lines:
-        runs = list(csv.DictReader(lines))
+    runs = rows_of(folder / "run" / "forward_runs.csv")
     assert len(runs) == 16
     for run in runs:
         assert ("solver" in run["error"]) == (float(run["b"]) > 5) == (run["output_1"] == "")
-    with (folder / "run" / "prediction.csv").open(newline="") as lines:
-        band = list(csv.DictReader(lines))
+    band = rows_of(folder / "run" / "prediction.csv")
     assert sum(float(row["low"]) < float(row["measured"]) < float(row["high"]) for row in band) >= 10
 
 
@@ -245,7 +242,7 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
     assert said.status == 0, said.err
     assert "fitted to what a forward model was calibrated on" in " ".join(said.out.split())
     assert "measurements)" not in said.out  # the points of the range are none
-    row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
+    row = rows_of(tmp_path / "predicted" / "prediction.csv")[0]
     median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))
     assert median == pytest.approx(3 * (1.1 - 1.1**-2), rel=0.01)  # kPa
     said = run_in(tmp_path, "predict", "run", "--mode", "planar", "--points", 3, "--out", "planar", "--no-figures")
@@ -321,8 +318,7 @@ def test_several_specimens_are_refused_until_one_is_read(tmp_path):
     assert not list(tmp_path.glob("run*"))
     said = run_in(tmp_path, *arguments, "--only", "specimen=S2", "--out", "run")
     assert said.status == 0, said.err
-    with (tmp_path / "run" / "prediction.csv").open(newline="") as lines:
-        measured = [float(row["measured"]) for row in csv.DictReader(lines)]
+    measured = [float(row["measured"]) for row in rows_of(tmp_path / "run" / "prediction.csv")]
     assert measured == [float(row.split(",")[1]) for row in others]
     by_sensor = [f"S{1 + number % 2},{row}" for number, row in enumerate(rows)]
     (tmp_path / "both.csv").write_text("\n".join([f"sensor,{heading}", *by_sensor]))  # of one test, which a model knows

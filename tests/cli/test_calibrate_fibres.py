@@ -10,7 +10,7 @@ import pytest
 from one_element import CCX
 from tissuq.mechanics import material_named
 
-from .models import rows_of
+from .conftest import rows_of
 from .test_ensemble_fibres import DECK
 
 MATERIAL = "neo-hookean+standard-fibres@30"

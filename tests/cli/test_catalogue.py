@@ -20,18 +20,12 @@ def test_names_that_are_not_listed_are_told(cli):
     assert all(form in said.out for form in FORMS)
 
 
-def test_the_page_of_materials_is_up_to_date(cli):
-    said = cli("materials", "--markdown")
+@pytest.mark.parametrize("name", ["materials", "modes"])
+def test_the_page_of_what_there_is_is_up_to_date(cli, name):
+    said = cli(name, "--markdown")
     assert said.status == 0
-    page = Path(__file__).parents[2] / "docs" / "materials.md"
-    assert said.out == page.read_text(encoding="utf-8"), "run: tissuq materials --markdown > docs/materials.md"
-
-
-def test_the_page_of_loading_modes_is_up_to_date(cli):
-    said = cli("modes", "--markdown")
-    assert said.status == 0
-    page = Path(__file__).parents[2] / "docs" / "modes.md"
-    assert said.out == page.read_text(encoding="utf-8"), "run: tissuq modes --markdown > docs/modes.md"
+    page = Path(__file__).parents[2] / "docs" / f"{name}.md"
+    assert said.out == page.read_text(encoding="utf-8"), f"run: tissuq {name} --markdown > docs/{name}.md"
 
 
 def test_no_line_of_the_list_of_materials_is_too_long_to_read(cli):

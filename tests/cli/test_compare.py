@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 
@@ -10,18 +9,16 @@ import pytest
 
 from marks import slow_but
 
-from .conftest import run_in, write_specimen
+from .conftest import fitted_in, rows_of
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     """Two run folders, of two discrepancies and of one."""
     folder = tmp_path_factory.mktemp("fitted")
-    write_specimen(folder / "specimen.csv")
     for name, discrepancies in (("first", ("none", "constant")), ("second", ("auto",))):
         options = [part for each in discrepancies for part in ("--discrepancy", each)]
-        said = run_in(folder, "fit", "specimen.csv", *options, "--noise-sd", 1, "--no-figures", "--out", name)
-        assert said.status == 0, said.err
+        fitted_in(folder, *options, "--no-figures", "--out", name)
     return folder
 
 
@@ -33,9 +30,8 @@ def two_runs(fitted, here):
     return here
 
 
-def rows_of(folder):
-    with (folder / "comparison.csv").open() as file:
-        return {row["fit"]: row for row in csv.DictReader(file)}
+def fits_in(folder):
+    return {row["fit"]: row for row in rows_of(folder / "comparison.csv")}
 
 
 @pytest.mark.slow
@@ -47,7 +43,7 @@ def test_runs_are_compared(cli, two_runs):
     assert "C10, kPa (95 %)" in said.out
     for explained in (cli("show", "compared", "--details"), cli("compare", "first", "second")):
         assert "weights for averaging predictions" in " ".join(explained.out.split())
-    rows = rows_of(two_runs / "compared")
+    rows = fits_in(two_runs / "compared")
     assert set(rows) == {"first/none", "first/constant", "second/auto"}
     (own,) = json.loads((two_runs / "second" / "assessment.json").read_text())
     assert float(rows["second/auto"]["evidence_change_quarter"]) == own["evidence_changes"]["quarter"]
@@ -78,11 +74,8 @@ def test_a_comparison_is_never_overwritten_unasked(cli, two_runs, empty_figures)
 
 
 @pytest.mark.parametrize(("arguments", "words"), [(["."], "no posterior"), (["missing"], "no posterior")])
-def test_what_is_no_run_is_refused(cli, here, arguments, words):
-    said = cli("compare", *arguments)
-    assert said.status == 2
-    assert words in said.err
-    assert "Traceback" not in said.err
+def test_what_is_no_run_is_refused(refused, arguments, words):
+    refused([words], "compare", *arguments)
 
 
 def test_a_run_is_compared_once(cli, here):
@@ -114,9 +107,9 @@ def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
     (two_runs / "first").rename(two_runs / "other" / "run")
     (two_runs / "second").rename(two_runs / "run")
     assert cli("compare", "other/run", "run", "--out", "one").status == 0
-    assert len(rows_of(two_runs / "one")) == 3
+    assert len(fits_in(two_runs / "one")) == 3
     assert cli("compare", "other/run/posterior/none.nc", "other/run", "--out", "two").status == 0
-    assert len(rows_of(two_runs / "two")) == 3
+    assert len(fits_in(two_runs / "two")) == 3
 
 
 @pytest.mark.slow
@@ -124,4 +117,4 @@ def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
 def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, empty_figures, text):
     (two_runs / "second" / "assessment.json").write_text(text)
     assert cli("compare", "first/posterior/none.nc", "second", "--out", "compared").status == 0
-    assert rows_of(two_runs / "compared")["second/auto"]["evidence_change_quarter"] == ""
+    assert fits_in(two_runs / "compared")["second/auto"]["evidence_change_quarter"] == ""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import os
 
 import pytest
 
-from .conftest import tree
+from .conftest import rows_of
 
 
 @pytest.fixture
@@ -19,11 +18,6 @@ def run(cli, here, specimen):
 TESTS = ("--candidate", "planar 1.05:1.2 6", "--candidate", "uniaxial 0.9:1.1 6")
 
 
-def rows_of(folder):
-    with (folder / "design.csv").open() as file:
-        return list(csv.DictReader(file))
-
-
 @pytest.mark.slow
 def test_tests_are_ranked_and_the_ranking_can_be_repeated(cli, run, here):
     said = cli("design", "run", *TESTS, "--target", "modulus", "--target", "planar:1.3")
@@ -32,10 +26,10 @@ def test_tests_are_ranked_and_the_ranking_can_be_repeated(cli, run, here):
     assert "planar 1.05 to 1.2, 6 points" in said.out
     folder = here / "runs" / "run-design"
     assert (folder / "figures" / "design.png").exists()
-    rows = rows_of(folder)
+    rows = rows_of(folder / "design.csv")
     assert [row["target"] for row in rows] == ["modulus"] * 4 + ["planar:1.3"] * 4
     assert cli("design", "--config", folder / "run.toml", "--out", "again").status == 0
-    assert rows_of(here / "again") == rows
+    assert rows_of(here / "again" / "design.csv") == rows
 
 
 def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
@@ -44,7 +38,7 @@ def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
     )
     said = cli("design", "--config", "tests.toml", "--no-figures", "--out", "ranked")
     assert said.status == 0, said.err
-    assert "mine" in {row["candidate"] for row in rows_of(here / "ranked")}
+    assert "mine" in {row["candidate"] for row in rows_of(here / "ranked" / "design.csv")}
 
 
 @pytest.mark.parametrize(
@@ -64,14 +58,9 @@ def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
         (["run", "--candidate", "planar 1:1.2 9", "--points", "10"], "a candidate states its own points"),
     ],
 )
-def test_what_cannot_be_used_is_told_and_leaves_nothing(cli, run, here, arguments, words):
-    before = tree(here)
-    said = cli("design", *arguments)
-    assert said.status == 2
-    assert words in said.err
-    assert "Traceback" not in said.err
+def test_what_cannot_be_used_is_told_and_leaves_nothing(refused, run, here, arguments, words):
+    said = refused([words], "design", *arguments)
     assert str(here) not in said.err  # paths are as typed
-    assert tree(here) == before
 
 
 def test_a_ranking_is_never_overwritten_unasked(cli, run, here):
@@ -96,7 +85,7 @@ def test_a_run_is_the_one_that_was_typed_where_the_folder_of_the_recipe_is_a_sym
     assert said.status == 0, said.err
     again = cli("design", "--config", "mine/ranked/run.toml", "--no-figures", "--out", "again")
     assert again.status == 0, again.err
-    assert rows_of(here / "again") == rows_of(here / "mine" / "ranked")
+    assert rows_of(here / "again" / "design.csv") == rows_of(here / "mine" / "ranked" / "design.csv")
 
 
 def test_what_to_do_next_repeats_the_modes_and_what_the_interval_is_of(cli, here, specimen):

@@ -14,8 +14,8 @@ import pytest
 import tissuq as tq
 from tissuq.report.source_run import said_by
 
-from .conftest import write_specimen
-from .models import DECK, rows_of, started
+from .conftest import rows_of, write_specimen
+from .models import DECK, started
 
 
 @pytest.mark.slow

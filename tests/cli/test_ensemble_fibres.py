@@ -6,7 +6,7 @@ import pytest
 
 from one_element import CCX, CORNERS, FREE, calculix
 
-from .models import rows_of
+from .conftest import rows_of
 
 MATERIAL = "neo-hookean+exponential-fibres@30"
 LINES = [f"{n + 1}, {x}., {y}., {z}." for n, (x, y, z) in enumerate(CORNERS)]

@@ -11,7 +11,8 @@ import pytest
 
 from refined_deck import refined
 
-from .models import DECK, rows_of, started
+from .conftest import rows_of
+from .models import DECK, started
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 FINER = ["--finer-model", "fine/model.inp", "--no-figures"]

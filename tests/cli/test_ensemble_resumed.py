@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from .models import killed_after, rows_of, started
+from .conftest import rows_of
+from .models import killed_after, started
 
 
 def test_what_is_done_is_not_done_again_and_another_quantity_needs_no_run(cli, here, model):

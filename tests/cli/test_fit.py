@@ -1,4 +1,3 @@
-import csv
 import json
 import re
 import shutil
@@ -10,25 +9,15 @@ import pytest
 import tissuq as tq
 from marks import slow_but
 
-from .conftest import STRESS_KPA, STRETCH, command, without_wall_times
+from .conftest import STRESS_KPA, STRETCH, command, rows_in_mpa, without_wall_times
 
 stretch, stress = np.array(STRETCH), np.array(STRESS_KPA)
 unit_stress = 2 * (stretch - stretch**-2)
 ALONE = ["--discrepancy", "none", "--no-figures"]
 
 
-TO_MPA = {"kPa": 1e-3, "Pa": 1e-6, "MPa": 1.0, "N/cm2": 1e-2, "psi": 6.894757293168361e-3}
-
-
-def in_mpa(row):
-    """Return the cells of a row with those of stresses in MPa, under the names without a unit."""
-    cells = ((*name.removesuffix("]").partition(" ["), value) for name, value in row.items())
-    return {name: str(float(value) * TO_MPA[unit]) if unit else value for name, _, unit, value in cells}
-
-
 def summary_of(folder):
-    with (folder / "summary.csv").open(newline="") as lines:
-        return list(map(in_mpa, csv.DictReader(lines)))
+    return rows_in_mpa(folder / "summary.csv")
 
 
 def written(file, **columns):

@@ -1,4 +1,3 @@
-import csv
 import json
 import tomllib
 
@@ -10,18 +9,13 @@ import xarray as xr
 import tissuq as tq
 from marks import slow_but
 
-from .conftest import command, without_wall_times
+from .conftest import command, rows_of, without_wall_times
 
 FORMULATIONS = ["none", "constant", "linear", "quadratic", "mooney-rivlin", "yeoh", "gp"]
 SUMMARY = (
     "formulation,C10_mean,C10_sd,C10_hdi_low,C10_hdi_high,contains_truth,log_evidence,predictive_coverage,"
     "predictive_coverage_model_only,rhat,ess,seconds"
 )
-
-
-def rows_of(file):
-    with file.open(newline="", encoding="utf-8") as lines:
-        return list(csv.DictReader(lines))
 
 
 @pytest.mark.slow
@@ -185,6 +179,14 @@ BASE = "points = 8\nseed = 4\n[priors.c]\ndistribution = 'uniform'\nlow = 0\nhig
 OPTIONS = ["--seed", 5, "--prior", "S=half-normal(2)", "--stretch-range", "0.8:1.6", "--no-figures"]
 
 
+def assert_of_both(settings):
+    """Compare with the options, and what the file has besides."""
+    assert (settings["points"], settings["seed"]) == (8, 5)
+    assert (settings["stretch_low"], settings["stretch_high"]) == (0.8, 1.6)
+    assert settings["priors"]["c"]["high"] == 3
+    assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
+
+
 def test_options_on_the_command_line_prevail_over_the_file_before_the_study(cli, here, monkeypatch):
     found = []
 
@@ -196,11 +198,7 @@ def test_options_on_the_command_line_prevail_over_the_file_before_the_study(cli,
     (here / "base.toml").write_text(BASE)
     said = cli("paper", "--config", "base.toml", *OPTIONS, "--out", "run")
     assert said.err == "tissuq: no further\n"
-    settings = found[0].model_dump()
-    assert (settings["points"], settings["seed"]) == (8, 5)
-    assert (settings["stretch_low"], settings["stretch_high"]) == (0.8, 1.6)
-    assert settings["priors"]["c"]["high"] == 3
-    assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
+    assert_of_both(found[0].model_dump())
 
 
 @pytest.mark.slow
@@ -208,11 +206,7 @@ def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_p
     (here / "base.toml").write_text(BASE)
     said = cli("paper", "--config", "base.toml", *OPTIONS, "--out", "run")
     assert said.status == 0, said.err
-    settings = tomllib.loads((here / "run" / "run.toml").read_text())
-    assert (settings["points"], settings["seed"]) == (8, 5)
-    assert (settings["stretch_low"], settings["stretch_high"]) == (0.8, 1.6)
-    assert settings["priors"]["c"]["high"] == 3
-    assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
+    assert_of_both(tomllib.loads((here / "run" / "run.toml").read_text()))
 
 
 @pytest.mark.slow

@@ -90,13 +90,8 @@ def test_files_that_someone_put_into_a_run_folder_are_not_deleted_by_force(cli, 
     ],
     ids=["a file", "under a file", "the current folder", "unwritable", "name too long", "name nearly too long"],
 )
-def test_a_folder_that_cannot_be_made_is_refused_and_leaves_nothing(cli, here, specimen, out, words):
-    before = tree(here)
-    said = cli("fit", specimen, *ALONE, "--out", out)
-    assert said.status == 2
-    assert all(word in said.err for word in words)
-    assert "Traceback" not in said.err
-    assert tree(here) == before
+def test_a_folder_that_cannot_be_made_is_refused_and_leaves_nothing(refused, specimen, out, words):
+    refused(words, "fit", specimen, *ALONE, "--out", out)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
@@ -111,29 +106,21 @@ PARTS = "recipe", "csv", "json", "page"
 STEPS = [*(f"report.writer.write_{part}" for part in PARTS), "posterior.posterior.Posterior.save"]
 
 
+def fail_for_want_of_space(*arguments, **options):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 @pytest.mark.parametrize("step", STEPS)
-def test_a_disk_that_is_full_at_any_step_leaves_nothing(cli, here, specimen, monkeypatch, step):
-    def fail(*arguments, **options):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    before = tree(here)
-    monkeypatch.setattr(f"tissuq.{step}", fail)
-    said = cli("fit", specimen, *ALONE, "--out", "new/folder/run")
-    assert said.status == 2
-    assert "the run could not be written to 'new/folder/run': No space left on device" in said.err
-    assert tree(here) == before
+def test_a_disk_that_is_full_at_any_step_leaves_nothing(refused, specimen, monkeypatch, step):
+    monkeypatch.setattr(f"tissuq.{step}", fail_for_want_of_space)
+    message = "the run could not be written to 'new/folder/run': No space left on device"
+    refused([message], "fit", specimen, *ALONE, "--out", "new/folder/run")
 
 
-def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(cli, here, specimen, monkeypatch):
+def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(cli, refused, specimen, monkeypatch):
     assert cli("fit", specimen, *ALONE).status == 0
-    before = tree(here)
-
-    def fail(*arguments, **options):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr("tissuq.report.writer.write_page", fail)
-    assert cli("fit", specimen, *ALONE, "--force").status == 2
-    assert tree(here) == before
+    monkeypatch.setattr("tissuq.report.writer.write_page", fail_for_want_of_space)
+    refused(["No space left on device"], "fit", specimen, *ALONE, "--force")
 
 
 def test_the_earlier_run_is_put_back_when_the_new_one_cannot_take_its_place(cli, here, specimen, monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import tomllib
 
 import numpy as np
@@ -10,6 +9,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.reading.tests_in_file import measurements
+
+from .conftest import rows_in_mpa, rows_of
 
 STRETCH = {"uniaxial": np.array([0.8, 0.9, 1.1, 1.2, 1.3, 1.4]), "planar": np.array([1.05, 1.1, 1.2, 1.3, 1.4])}
 NOISE = {"uniaxial": 1e-3 * np.array([1, 0, -2, 1, 0, -1]), "planar": 1e-3 * np.array([2, -4, 0, 3, -1])}
@@ -35,15 +36,8 @@ def files(here):
     ]
 
 
-def in_mpa(row):
-    """Return the cells of a row with those in kPa in MPa, under the names without a unit."""
-    cells = ((*name.removesuffix("]").partition(" ["), value) for name, value in row.items())
-    return {name: str(float(value) * 1e-3) if unit else value for name, _, unit, value in cells}
-
-
 def summary_of(folder):
-    with (folder / "summary.csv").open(newline="") as lines:
-        return list(map(in_mpa, csv.DictReader(lines)))
+    return rows_in_mpa(folder / "summary.csv")
 
 
 def expected(files, **options):
@@ -63,8 +57,7 @@ def test_strips_along_both_axes_of_a_tissue_are_fitted_with_fibres(cli, here):
     assert "--discrepancy gp-pinned" in refused.err
     said = cli("fit", *options, *ALONE, "--tolerance", "none", "--out", "run")
     assert (said.status, said.err) == (0, "")
-    with (here / "run" / "parameters.csv").open(newline="") as lines:
-        rows = {row["parameter"]: row for row in csv.DictReader(lines)}
+    rows = {row["parameter"]: row for row in rows_of(here / "run" / "parameters.csv")}
     assert list(rows) == ["C10", "k_over_C10", "k"]
     assert (rows["k"]["unit"], rows["k"]["prior"]) == ("kPa", "follows from the others")
     assert float(rows["k"]["hdi_low"]) < 50 < float(rows["k"]["hdi_high"])
@@ -87,8 +80,8 @@ def test_a_folder_is_fitted_with_the_modes_that_files_or_names_say(cli, files, h
     assert "planar test, 5 measurements, stretch 1.05 to 1.4" in page
     assert "uniaxial test, 6 measurements, stretch 0.8 to 1.4" in page
     assert "Errors of whole tests (standard deviations): 0.18 of the stress" in page
-    with (here / "runs" / "tests" / "data.csv").open(newline="") as lines:
-        assert [row["mode"] for row in csv.DictReader(lines)] == ["planar"] * 5 + ["uniaxial"] * 6
+    rows = rows_of(here / "runs" / "tests" / "data.csv")
+    assert [row["mode"] for row in rows] == ["planar"] * 5 + ["uniaxial"] * 6
 
 
 def test_specimens_noise_and_tolerances_are_those_given(cli, files, here):
@@ -140,8 +133,7 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
     assert "Each test predicted from the others" in said.out
     parts = [tq.read_experiment(file, mode=mode) for file, mode in zip(files, ("planar", "uniaxial"), strict=True)]
     found = tq.held_out_tests(parts, discrepancy="none", noise_sd=1.5e-3)
-    with (here / "run" / "held_out.csv").open(newline="") as lines:
-        rows = list(map(in_mpa, csv.DictReader(lines)))
+    rows = rows_in_mpa(here / "run" / "held_out.csv")
     assert [row["test"] for row in rows] == ["b", "uniaxial"]
     for name in ("inside", "beyond", "half_width", "error", "C10_median"):
         assert [float(row[name]) for row in rows] == pytest.approx(found[name].tolist(), rel=1e-9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import subprocess
 import sys
@@ -11,6 +10,8 @@ import pytest
 
 from tissuq.cli.progress import _left
 from tissuq.validation.coverage import PRESETS
+
+from .conftest import rows_of
 
 CAMPAIGN = """
 designs = [{ low = 0.7, high = 2.0, points = 9, noise_sd = 0.1 }]
@@ -41,8 +42,7 @@ def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
     arguments = ("study", "sbc", "--config", "quick.toml", "--noise", "known", "--out", "out")
     assert cli(*arguments).status == 0
     tasks = (here / "out" / "tasks.jsonl").read_bytes()
-    with (here / "out" / "ranks.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(here / "out" / "ranks.csv")
     assert [(row["formulation"], row["parameter"]) for row in rows] == [
         ("none", "C10"), ("zero-modulus", "C10"), ("zero-modulus", "c1"),
     ]  # fmt: skip
@@ -103,8 +103,7 @@ def test_structures_write_bands_and_go_on(cli, here):
     said = cli(*arguments)
     assert said.status == 0, said.err
     tasks = (here / "out" / "tasks.jsonl").read_bytes()
-    with (here / "out" / "bands.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(here / "out" / "bands.csv")
     assert [(row["truth"], row["tests"], row["structure"]) for row in rows] == [
         ("gent", "1", "bar"),
         ("gent", "2", "bar"),
@@ -112,8 +111,7 @@ def test_structures_write_bands_and_go_on(cli, here):
     for row in rows:
         assert float(row["default_low"]) < float(row["default_mean"]) < float(row["default_high"])
         assert float(row["force_N"]) == pytest.approx(float(row["oracle_mean"]), rel=0.5)
-    with (here / "out" / "summary.csv").open() as file:
-        (summary,) = csv.DictReader(file)
+    (summary,) = rows_of(here / "out" / "summary.csv")
     inside = [float(row["default_low"]) <= float(row["force_N"]) <= float(row["default_high"]) for row in rows]
     assert float(summary["inside"]) == pytest.approx(sum(inside) / 2)
     (here / "out" / "tasks.jsonl").write_bytes(tasks[: tasks.index(b"\n") + 20])

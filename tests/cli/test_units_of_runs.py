@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import json
 
 import pytest
 
 import tissuq as tq
 
-
-def rows_of(file):
-    with file.open(newline="") as lines:
-        return list(csv.DictReader(lines))
+from .conftest import rows_of
 
 
 @pytest.fixture

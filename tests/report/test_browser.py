@@ -27,10 +27,10 @@ NUMBER = r"-?\d+\.?\d*(?:e[+-]?\d+)?"
 
 
 @pytest.fixture(scope="module")
-def of_one_test(specimen_study, specimen_file, tmp_path_factory):
+def of_one_test(specimen_study, tmp_path_factory):
     """The page of a fit with several formulations."""
     folder = tmp_path_factory.mktemp("one")
-    write_result(specimen_result(specimen_study, [specimen_file]), folder)
+    write_result(specimen_result(specimen_study), folder)
     return folder / "report.html"
 
 
@@ -46,7 +46,7 @@ def of_two_tests(tmp_path_factory):
     tests = [{"file": str(file), "mode": file.stem, "noise_sd": 0.01} for file in files]
     study = run_specimen(SpecimenSettings(tests=tests, material="ogden-1", discrepancies=["none"]))
     (folder / "run").mkdir()
-    write_result(specimen_result(study, files), folder / "run")
+    write_result(specimen_result(study), folder / "run")
     return folder / "run" / "report.html"
 
 
@@ -142,7 +142,7 @@ def test_loading_and_unloading_are_read_out_apart(tmp_path):
     study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 0.0001}], discrepancies=["none"]))
     folder = tmp_path / "run"
     folder.mkdir()
-    write_result(specimen_result(study, [file]), folder)
+    write_result(specimen_result(study), folder)
     with opened(folder / "report.html") as page:
         page.fill(TYPED, "1.2")
         stress = 1.2 - 1.2**-2
@@ -156,7 +156,7 @@ def test_small_stresses_are_told_apart_on_the_axis_and_in_words(tmp_path):
     study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 1e-7}], discrepancies=["none"]))
     folder = tmp_path / "run"
     folder.mkdir()
-    write_result(specimen_result(study, [file]), folder)
+    write_result(specimen_result(study), folder)
     with opened(folder / "report.html") as page:
         assert "measured 4.25e-05, predicted" in page.inner_text(READOUT)
         page.evaluate("""() => {

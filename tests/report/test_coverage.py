@@ -7,8 +7,8 @@ import pytest
 
 from tissuq.experiments.numbers import unbroken
 from tissuq.report.coverage import coverage_result, coverage_table
-from tissuq.report.run_folder import RECIPE
 from tissuq.report.writer import write_result
+from tissuq.studies.settings import RECIPE
 from tissuq.validation.coverage import CoverageSettings, summarise
 from tissuq.validation.coverage.campaign import tasks_of
 

@@ -122,7 +122,7 @@ def test_long_names_of_tests_leave_room_for_the_figure(study, tmp_path):
 
 
 def test_the_figure_has_a_panel_for_each_target_with_the_best_on_top(study):
-    axes = design_figure(study).axes
+    axes = design_figure(study, study.targets).axes
     assert [axis.get_title(loc="left") for axis in axes] == ["initial shear modulus", "Jm"]
     labels = [label.get_text() for label in axes[0].get_yticklabels()]
     assert labels[0] == study.table["candidate"].iloc[0]

@@ -78,16 +78,16 @@ def long_paper_folder(paper_study, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def specimen_folder(specimen_study, specimen_file, tmp_path_factory):
+def specimen_folder(specimen_study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimen")
-    write_result(specimen_result(specimen_study, [specimen_file]), folder)
+    write_result(specimen_result(specimen_study), folder)
     return folder
 
 
 @pytest.fixture(scope="session")
-def long_specimen_folder(long_specimen_study, specimen_file, tmp_path_factory):
+def long_specimen_folder(long_specimen_study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("long_specimen")
-    write_result(specimen_result(long_specimen_study, [specimen_file]), folder)
+    write_result(specimen_result(long_specimen_study), folder)
     return folder
 
 
@@ -210,8 +210,8 @@ def test_the_summary_on_the_page_has_stability_in_the_modes_that_were_measured(s
     assert cells[headers.index("stable") - 1] == f"{100 * probability:.0f}\u00a0%"
 
 
-def test_a_page_without_figures_says_how_to_repeat_it_without(specimen_study, specimen_file, tmp_path):
-    write_result(specimen_result(specimen_study, [specimen_file]), tmp_path, figures=False)
+def test_a_page_without_figures_says_how_to_repeat_it_without(specimen_study, tmp_path):
+    write_result(specimen_result(specimen_study), tmp_path, figures=False)
     text = (tmp_path / "report.html").read_text()
     assert "tissuq fit --no-figures --config run.toml" in words_of(text)
     assert "<img" not in text

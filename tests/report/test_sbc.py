@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tissuq.report.run_folder import RECIPE
 from tissuq.report.sbc import COLUMNS, sbc_result
 from tissuq.report.writer import write_result
+from tissuq.studies.settings import RECIPE
 from tissuq.validation.sbc import SbcSettings, summarise_ranks
 
 

@@ -17,8 +17,8 @@ from tissuq.report.writer import read_record, write_result
 
 
 @pytest.fixture(scope="module")
-def result(specimen_study, specimen_file):
-    return specimen_result(specimen_study, [specimen_file])
+def result(specimen_study):
+    return specimen_result(specimen_study)
 
 
 def test_the_numbers_are_those_of_the_answer_in_the_unit_of_the_file(result, specimen_study):
@@ -104,11 +104,9 @@ def test_the_parameters_for_people_are_those_for_programs(result, specimen_study
     assert float(row[5]) == pytest.approx(1e3 * marginal.mean, rel=0.02)
 
 
-def test_nothing_is_drawn_and_no_band_computed_where_no_figures_are_wanted(
-    specimen_study, specimen_file, tmp_path, monkeypatch
-):
+def test_nothing_is_drawn_and_no_band_computed_where_no_figures_are_wanted(specimen_study, tmp_path, monkeypatch):
     monkeypatch.setattr("tissuq.report.specimen.described_curves", lambda _: pytest.fail("a band was computed"))
-    write_result(specimen_result(specimen_study, [specimen_file]), tmp_path, figures=False)
+    write_result(specimen_result(specimen_study), tmp_path, figures=False)
     assert "chart-data" not in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "assessment.json").read_text())[0]["formulation"] == "constant"
 

@@ -23,7 +23,7 @@ def run(tmp_path_factory):
     (folder / "specimen.csv").write_text("stretch,stress_kPa\n" + "".join(rows))
     settings = SpecimenSettings(file="specimen.csv", discrepancies=("none", "gp"), noise_sd=20.0)
     with run_folder(folder / "run", "fit") as place:
-        write_result(specimen_result(run_specimen(settings, folder), [folder / "specimen.csv"]), place, figures=False)
+        write_result(specimen_result(run_specimen(settings, folder), folder), place, figures=False)
     return folder
 
 

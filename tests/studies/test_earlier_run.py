@@ -37,7 +37,7 @@ def written_run(tmp_path_factory):
     )
     folder = tmp_path / "run"
     folder.mkdir()
-    write_result(specimen_result(run_specimen(settings), [source]), folder, figures=False)
+    write_result(specimen_result(run_specimen(settings)), folder, figures=False)
     source.unlink()
     return folder
 
@@ -120,7 +120,7 @@ def test_a_sum_has_its_name_in_the_literature_however_it_is_typed(tmp_path):
         material="neo-hookean+standard-fibres",
         discrepancies=("none",),
     )
-    result = specimen_result(run_specimen(settings), [tmp_path / "sheet.csv"])
+    result = specimen_result(run_specimen(settings))
     assert result.title == "sheet: standard-reinforcing"
     (tmp_path / "run").mkdir()
     write_result(result, tmp_path / "run", figures=False)

@@ -46,7 +46,7 @@ def run(data, tmp_path_factory):
     settings = SpecimenSettings(file=str(file), discrepancies=("constant", "none"), noise_sd=1000 * NOISE_SD)
     study = run_specimen(settings)
     (folder / "run").mkdir()
-    write_result(specimen_result(study, [file]), folder / "run", figures=False)
+    write_result(specimen_result(study), folder / "run", figures=False)
     return folder / "run"
 
 

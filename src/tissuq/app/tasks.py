@@ -93,7 +93,7 @@ def fit(request: Mapping[str, Any], say: Say) -> None:
         say("answer", {**record, **of_page})
 
     study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=readings, early=say_answer)
-    say("done", _written("fit", RUNS / name, partial(specimen_result, study, _sources(settings)), say))
+    say("done", _written("fit", RUNS / name, partial(specimen_result, study), say))
 
 
 def laws(request: Mapping[str, Any], say: Say) -> None:
@@ -109,7 +109,7 @@ def laws(request: Mapping[str, Any], say: Say) -> None:
     settings = _settings(LawSettings, values | options)
     study = run_laws(settings, Path(), lambda text: say("step", text), found=readings)
     folder_name = f"{name}-laws"
-    written = _written("fit", RUNS / folder_name, partial(law_result, study, _sources(settings)), say)
+    written = _written("fit", RUNS / folder_name, partial(law_result, study), say)
     values_of_run = {"specimen": _specimens(request)} | options | {"out": f"runs/{folder_name}"}
     shell = _shell("fit", *_files(request), values_of_run)
     table = law_table(study)
@@ -260,10 +260,6 @@ def _written(verb: str, target: Path, result_of: Callable[[], Result], say: Say)
     with run_folder(target, verb, force=True) as folder:
         write_result(result_of(), folder, target=target)
     return {"run": target.name, "report": f"{target.as_posix()}/report.html"}
-
-
-def _sources(settings: Any) -> list[Path]:
-    return [Path(test.file) for test in settings.tests or (settings,)]
 
 
 def _shell(

@@ -91,7 +91,6 @@ class Campaign(Configured):
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound=Running)
 Study = TypeVar("Study")
-Whole = TypeVar("Whole", bound=Settings)
 NOT_CONVERGED = 3
 """The exit status where sampling has not converged."""
 
@@ -103,6 +102,7 @@ class Call(Generic[Kind, How]):
     Attributes
     ----------
     kind : type of Settings
+        What a file of them may hold.
     stated : dict
         The settings that were typed.
     typed : mapping of str to str
@@ -142,11 +142,7 @@ class Call(Generic[Kind, How]):
 
     def loaded(self, rivals: tuple[str, ...] = (), **changes: Any) -> Kind:
         """Return the settings with changes to what was typed; of rivals only one can be set."""
-        return self.loaded_as(self.kind, rivals, **changes)
-
-    def loaded_as(self, kind: type[Whole], rivals: tuple[str, ...] = (), **changes: Any) -> Whole:
-        """Return `loaded` settings of another class, which may add what only a file can say."""
-        return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
+        return load_settings(self.kind, self.config, self.stated | changes, rivals, self.typed)
 
     def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:
         """Return what shows the tasks of a campaign, which are kept in a folder as they are done."""

@@ -87,7 +87,8 @@ def command(
             how, typed_how = stated(of_running, values)
             checked = load_settings(running, None, how, typed=typed_how)
             monitor = Monitor(checked.quiet, checked.verbose) if isinstance(checked, Verbosity) else Monitor()
-            call = Call(settings, *stated(of_settings, values), checked, carry_out.__name__, monitor)
+            kind: Any = settings_of(carry_out.__name__) or settings
+            call = Call(kind, *stated(of_settings, values), checked, carry_out.__name__, monitor)
             with stopping(monitor), redirect_stdout(StringIO()) if monitor.is_quiet else nullcontext():
                 carry_out(call)
 
@@ -125,9 +126,7 @@ class Command(TyperCommand):
 def settings_of(name: str) -> type[Settings] | None:
     """Return the class of what the file of a command may hold, None where it takes no file."""
     kind, location = CONFIGURED.get(name, (None, ""))
-    if not location:
-        return kind
-    of_whole_file: type[Settings] = imported(location)
+    of_whole_file: type[Settings] | None = imported(location) if location else kind
     return of_whole_file
 
 

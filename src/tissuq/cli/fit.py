@@ -68,9 +68,9 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
         is_comparison = setting_of(call.config, "laws") is not None
     law_settings = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
     laws_of_names = {name: material_named(name, laws=True) for name in names if name != ALL}
-    kind = LawSettings if is_comparison else SpecimenSettings
-    settings = call.loaded_as(kind, ("noise", "noise_sd"), **of_tests, **law_settings)
-    sources = [call.beside / test.file for test in settings.tests or (settings,)]
+    call = replace(call, kind=LawSettings if is_comparison else SpecimenSettings)
+    settings = call.loaded(("noise", "noise_sd"), **of_tests, **law_settings)
+    sources = settings.sources(call.beside)
     if files and call.config:
         _check_same(files[0], sources[0], call.config)
     readings = settings.readings(call.beside, read_tests)
@@ -80,7 +80,7 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
         Experiment.of([reading.experiment for reading in readings]),
     )
     target = call.target(Path("runs") / run_name(paths, call.config, sources))
-    study = _fitted(call, settings, laws_of_names, readings, sources, target)
+    study = _fitted(call, settings, laws_of_names, readings, target)
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     not_converged(study.not_converged)
@@ -91,7 +91,6 @@ def _fitted(
     settings: SpecimenSettings,
     user_laws: dict[str, Material],
     readings: list[Reading],
-    sources: list[Path],
     target: Path,
 ) -> SpecimenStudy | LawStudy:
     """Fit one material, or several laws; write the run and print its summary."""
@@ -102,7 +101,7 @@ def _fitted(
         of_laws: LawStudy = call.carried_out(
             target,
             lambda step: run_laws(settings, call.beside, step, user_laws, readings, call.how.workers),
-            partial(law_result, sources=sources),
+            partial(law_result, beside=call.beside),
         )
         return of_laws
     from tissuq.report.specimen import specimen_result
@@ -112,7 +111,7 @@ def _fitted(
     of_material: SpecimenStudy = call.carried_out(
         target,
         lambda step: run_specimen(settings, call.beside, step, law, readings),
-        partial(specimen_result, sources=sources),
+        partial(specimen_result, beside=call.beside),
         steps_of(settings) + 1,
     )
     return of_material

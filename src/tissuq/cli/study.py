@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tissuq.cli.call import Call, Campaign, Written, check_folder, not_converged, write_campaign_recipe
-from tissuq.cli.command import Command, command
+from tissuq.cli.command import Command, command, settings_of
 from tissuq.errors import InputError
 from tissuq.studies.campaign_settings import (
     CoverageOptions,
@@ -49,18 +49,17 @@ def _study() -> None:
 def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
     from tissuq.report.coverage import coverage_result
-    from tissuq.validation.coverage import PRESETS, CoverageSettings, preset, run_campaign
+    from tissuq.validation.coverage import PRESETS, preset, run_campaign
 
     name = call.how.preset
     if name == "sbc" and call.config is None:
-        _calibrate(replace(call, kind=SbcOptions))  # type: ignore[arg-type]
+        _calibrate(replace(call, kind=settings_of("sbc")))  # type: ignore[arg-type]
         return
     if (call.config is None) == (name is None):
         raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}, sbc.")
     of_preset: dict[str, Any] = preset(name) if name else {}
-    settings = call.loaded_as(CoverageSettings, **of_preset | call.stated)
     folder = call.how.out or Path("runs") / f"coverage-{name or (call.config or Path()).stem}"
-    _carry_out(call, settings, folder, run_campaign, coverage_result)
+    _carry_out(replace(call, stated=of_preset | call.stated), folder, run_campaign, coverage_result)
 
 
 @study.command("sbc", cls=Command)
@@ -70,14 +69,13 @@ def sbc(call: Call[SbcOptions, Campaign]) -> None:
     _calibrate(call)
 
 
-def _calibrate(call: Call[SbcOptions, Any]) -> None:
+def _calibrate(call: Call[Any, Any]) -> None:
     """Carry out simulation-based calibration."""
     from tissuq.report.sbc import sbc_result
-    from tissuq.validation.sbc import SbcSettings, run_sbc
+    from tissuq.validation.sbc import run_sbc
 
-    settings, material = call.loaded_as(SbcSettings), call.stated.get("material")
-    folder = _folder(call, f"sbc-{material}" if material else "sbc")
-    _carry_out(call, settings, folder, run_sbc, sbc_result)
+    material = call.stated.get("material")
+    _carry_out(call, _folder(call, f"sbc-{material}" if material else "sbc"), run_sbc, sbc_result)
 
 
 @study.command("tissues", cls=Command)
@@ -85,9 +83,9 @@ def _calibrate(call: Call[SbcOptions, Any]) -> None:
 def tissues(call: Call[TissueOptions, Campaign]) -> None:
     """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
     from tissuq.report.tissues import tissue_result
-    from tissuq.validation.tissues import TissueSettings, run_benchmark
+    from tissuq.validation.tissues import run_benchmark
 
-    _carry_out(call, call.loaded_as(TissueSettings), _folder(call, "tissues"), run_benchmark, tissue_result)
+    _carry_out(call, _folder(call, "tissues"), run_benchmark, tissue_result)
 
 
 @study.command("structures", cls=Command)
@@ -95,10 +93,9 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
 def structures(call: Call[StructureStudyOptions, Campaign]) -> None:
     """Predict forces of structures from simple tests of a known law, and count how often bands hold; resumable."""
     from tissuq.report.structures import structures_result
-    from tissuq.validation.structures import StructureStudySettings, run_structures
+    from tissuq.validation.structures import run_structures
 
-    settings = call.loaded_as(StructureStudySettings)
-    _carry_out(call, settings, _folder(call, "structures"), run_structures, structures_result)
+    _carry_out(call, _folder(call, "structures"), run_structures, structures_result)
 
 
 def _folder(call: Call[Any, Any], name: str) -> Path:
@@ -108,7 +105,6 @@ def _folder(call: Call[Any, Any], name: str) -> Path:
 
 def _carry_out(
     call: Call[Any, Any],
-    settings: Any,
     folder: Path,
     run: CampaignOfTasks[Any],
     result_of: Callable[[Any, list[dict[str, Any]]], Result],
@@ -116,6 +112,7 @@ def _carry_out(
     """Carry out a campaign in its folder, and put its result there; nothing is written before its workers are there."""
     from tissuq.studies.stream import open_pool
 
+    settings = call.settings
     total = len(run.tasks_of(settings))
     check_folder(folder, settings)
     with open_pool(call.how.workers, call.how.scheduler) as pool, call.campaign_in(folder)(total) as step:
@@ -136,11 +133,11 @@ class PaperRunning(Written):
 def paper(call: Call[PaperOptions, PaperRunning]) -> None:
     """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
     from tissuq.report.paper import paper_result
-    from tissuq.validation.paper import PaperSettings, run_paper
+    from tissuq.validation.paper import run_paper
     from tissuq.validation.paper.study import steps_of
 
     low, high = call.how.stretch_range or (None, None)
-    settings = call.loaded_as(PaperSettings, stretch_low=low, stretch_high=high)
+    settings: Any = call.loaded(stretch_low=low, stretch_high=high)
     target = call.target(Path("runs/paper"))
     study = call.carried_out(target, lambda step: run_paper(settings, step), paper_result, steps_of(settings))
     not_converged(study.not_converged)

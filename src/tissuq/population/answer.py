@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.draws import PopulationDraws
-from tissuq.population.patient import patient_band
+from tissuq.population.patient import check_one_control, patient_band
 from tissuq.population.picture import numbers_of
 from tissuq.population.uses import NOT_PREDICTED, share_of_initial_stiffness, uses_of_population
 from tissuq.population.warnings import specimens_with
@@ -26,8 +26,10 @@ from tissuq.prediction.bands import Band, asked_for
 
 MODULUS = "initial shear modulus"
 ENDS = ("hdi_low", "hdi_high")
-POINTS = 41
-"""Of the stress of a new specimen, by which it is judged how well it is predicted."""
+POINTS = 81
+"""Of the stress of a new specimen where specimens were measured."""
+Measured: TypeAlias = tuple[LoadingMode, int]
+"""A loading mode and the number of one of its stresses."""
 
 
 class PopulationEstimate(NamedTuple):
@@ -101,8 +103,9 @@ def answer_of_population(
         estimate("spread between specimens" + ", as a factor" * is_log, "spread", unit.name),
     )
     share = share_of_discrepancy(population)
-    known = [*(_bands(population) if bands is None else bands)]
-    uses = uses_of_population(population, known, "modulus" if words == MODULUS else words)
+    if bands is None:
+        bands = [band for (band,) in stresses_where_measured(population, (True,))[0].values()]
+    uses = uses_of_population(population, [*bands], "modulus" if words == MODULUS else words)
     law = about_law(population, share) + about_modulus(population, share, words)
     return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip(), share)
 
@@ -116,22 +119,29 @@ def patient_in_words(population: PopulationDraws, known: Mapping[str, Any] | Non
     return f" ({text})" if text else ""
 
 
-def _bands(population: PopulationDraws) -> Iterator[Band]:
-    """Yield the stress of a new specimen where specimens were measured; nothing where it cannot be predicted."""
-    reach = dict[tuple[LoadingMode, int], list[float]]()
-    for fit in population.posteriors.values():
-        for curve in fit.model.experiment.curves:
-            measured = curve.mode, curve.mode.stresses.index(curve.quantity)
-            reach.setdefault(measured, []).extend([curve.abscissa.min(), curve.abscissa.max()])
-    for (mode, channel), ends in reach.items():
-        stretch = np.linspace(min(ends), max(ends), POINTS)
-        of_stress: dict[str, Any] = {"prob": 0.95, "channel": channel, "discrepancy": True}
+def stresses_where_measured(
+    population: PopulationDraws, kinds: Sequence[bool]
+) -> tuple[dict[Measured, tuple[Band, ...]], list[str]]:
+    """Return every stress of a new specimen where specimens were measured, and why those of a mode are not predicted.
+
+    With the model error for a true one of the ``kinds``, and of the material alone for a false one.
+    """
+    bands, not_predicted = dict[Measured, tuple[Band, ...]](), list[str]()
+    tests = [test for fit in population.posteriors.values() for test in fit.model.experiment.tests]
+    for mode in population.complete.model.experiment.modes:
+        reach = np.concatenate([test.stretch for test in tests if test.mode == mode])
+        stretch = np.linspace(reach.min(), reach.max(), POINTS)
         try:
-            asked_for([population.complete.solution], stretch, mode=mode, **of_stress)
-            low, median, high = patient_band(population, mode, stretch, **of_stress)
-        except TissuqError:
-            continue
-        yield Band(stretch, median, low, high)
+            check_one_control(mode)
+            for channel in range(len(mode.stresses)):
+                of_stress: dict[str, Any] = {"prob": 0.95, "channel": channel}
+                asked_for([population.complete.solution], stretch, mode=mode, discrepancy=any(kinds), **of_stress)
+                bands[mode, channel] = tuple(
+                    patient_band(population, mode, stretch, discrepancy=kind, **of_stress) for kind in kinds
+                )
+        except TissuqError as error:  # two controls, or some of the population's materials lock before the largest
+            not_predicted.append(f"{mode.name}: {error}")
+    return bands, not_predicted
 
 
 def headline(population: PopulationDraws) -> tuple[str, float]:

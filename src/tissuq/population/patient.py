@@ -20,6 +20,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.population.draws import PopulationDraws
 from tissuq.population.likelihoods import Coordinates
 from tissuq.posterior.posterior import Posterior
+from tissuq.prediction.bands import Band
 from tissuq.prediction.moments import drawn_curves, values_of
 
 if TYPE_CHECKING:
@@ -116,8 +117,8 @@ def patient_band(
     *,
     channel: int,
     discrepancy: bool,
-) -> FloatArray:
-    """Return low, median and high (3, g) of the stress of a new specimen, whose model error is a random specimen's.
+) -> Band:
+    """Return the stress of a new specimen, whose model error is a random specimen's.
 
     At every point it is that of one of the specimens that were measured there, which share all draws among them.
 
@@ -160,7 +161,8 @@ def patient_band(
                 posterior, coordinates, matching[rows], patients[rows], points[columns], mode=loading, channel=channel,
                 discrepancy=discrepancy,
             )  # fmt: skip
-    return np.asarray(np.quantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0))
+    low, median, high = np.quantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
+    return Band(points, median, low, high)
 
 
 def _knows_error(posterior: Posterior, mode: LoadingMode, points: FloatArray) -> BoolArray:

@@ -235,9 +235,8 @@ class Population(PopulationDraws):
             return self.given(covariates).new_patient(stretch, **of_patient, unit=unit)
         options: dict[str, Any] = {"discrepancy": discrepancy, "mode": mode, "channel": channel}
         loading, points = asked_for([self.complete.solution], stretch, prob=prob, **options)
-        low, median, high = patient_band(self, loading, points, prob, channel=channel, discrepancy=discrepancy)
-        table = pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
-        return in_unit(table, ["median", "low", "high"], self.unit(unit).name)
+        band = patient_band(self, loading, points, prob, channel=channel, discrepancy=discrepancy)
+        return in_unit(pd.DataFrame(vars(band)), ["median", "low", "high"], self.unit(unit).name)
 
     def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:
         """Draw the parameters of every specimen, by itself and within the population: a panel for each of `symbols`.

@@ -101,12 +101,8 @@ def design_table(study: DesignStudy, target: Target, limit: int | None = None) -
     return Table.of((row for _, row in rows.iterrows()), columns, _capitalised(title), text_columns=(0, 3), note=note)
 
 
-def design_figure(study: DesignStudy) -> Figure:
-    """Return the expected standard deviation after every test, a panel for each target, the best on top."""
-    return _figure(study, study.targets, MAX_ROWS, WIDTH)
-
-
-def _figure(study: DesignStudy, targets: Sequence[Target], limit: int, width: float) -> Figure:
+def design_figure(study: DesignStudy, targets: Sequence[Target], limit: int = MAX_ROWS, width: float = WIDTH) -> Figure:
+    """Return the expected standard deviation after the best tests, a panel for each target, the best on top."""
     shown = [_shown(_rows_of(study, target), limit) for target in targets]
     lines_of = partial(wrap, width=int(LETTERS_PER_INCH * width), break_on_hyphens=False)
     height = 1.5 + max(sum(0.1 + LINE * len(lines_of(name)) for name in table["candidate"]) for table in shown)
@@ -136,7 +132,9 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
     said = said_by(run)
     rows = [row for target in study.targets for row in _rows_of(study, target).to_dict("records")]
     model = study.posterior.model
-    figure = Picture("design", lambda: design_figure(study), "Expected standard deviations after each test", CAPTION)
+    figure = Picture(
+        "design", lambda: design_figure(study, study.targets), "Expected standard deviations after each test", CAPTION
+    )
     how_to_read = (
         *study.explanations,
         "The ranking does not know what a laboratory can do: of two tests with nearly the same number choose the one "
@@ -152,7 +150,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
         finding=" ".join(_sentences(study)[MAX_TARGETS:]),
         next_step=_next_step(study, bool(said.warnings)) if best else "",
         picture=Picture(
-            "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
+            "answer", lambda: design_figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
             "Expected standard deviation after the best tests", "Expected standard deviation after a test; line: now."
         ),
         tables=tuple(design_table(study, target, TABLE_ROWS) for target in study.targets),

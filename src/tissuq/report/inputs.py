@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics.user_law import LAW
+from tissuq.report.result import Result
 from tissuq.studies.fit_settings import LawSettings, SpecimenSettings
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.settings import INPUT
+
+if TYPE_CHECKING:
+    from tissuq.studies.laws import LawStudy
+    from tissuq.studies.specimen import SpecimenStudy
 
 
 class Copies(dict[str, Path]):
@@ -35,27 +41,24 @@ class Copies(dict[str, Path]):
         return "+".join(map(self.of_code, material.split("+")))
 
 
-class Inputs(NamedTuple):
-    """Copies by their names in the run, the recipe that names them, settings of no meaning, options of user laws."""
-
-    files: dict[str, Path]
-    recipe: SpecimenSettings
-    without: frozenset[str]
-    options: str
-
-
-def inputs_of(settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path]) -> Inputs:
-    """Return what a fit started from; ``sources`` are the files that were read, one a test."""
-    copies, several_laws = Copies(), isinstance(settings, LawSettings)
-    named = list(settings.laws) if isinstance(settings, LawSettings) else [settings.material]
-    names = list(map(copies.of_law, named))
+def with_inputs(result: Result, study: SpecimenStudy | LawStudy, beside: Path) -> Result:
+    """Return the result of a fit with copies of the files in ``beside`` that it started from, and its recipe."""
+    settings, copies = study.settings, Copies()
+    laws = settings.laws if isinstance(settings, LawSettings) else ()
+    named = list(laws) or [settings.material]
+    names, sources = list(map(copies.of_law, named)), settings.sources(beside)
     copy_of = {file: copies.of_file(file) for file in sources}
-    relocated = _relocated(settings, experiment, sources, copy_of)
-    relocated |= {"laws": tuple(names)} if several_laws else {"material": names[0]}
+    relocated = _relocated(settings, study.experiment, sources, copy_of)
+    relocated |= {"laws": tuple(names)} if laws else {"material": names[0]}
     without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
     options = "".join(f" --material {name}" for name in names) if names != named else ""
-    recipe = settings.model_copy(update=relocated)
-    return Inputs(copies, recipe, without | {"material"} if several_laws else without, options)
+    return replace(
+        result,
+        command=f"{result.command}{options}",
+        files={**copies, **result.files},
+        recipe=settings.model_copy(update=relocated),
+        without=without | {"material"} if laws else without,
+    )
 
 
 def _relocated(

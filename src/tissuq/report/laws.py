@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.curves import points_along, ways_of
 from tissuq.posterior.laws import ALL_LAWS
-from tissuq.report.inputs import inputs_of
+from tissuq.report.inputs import with_inputs
 from tissuq.report.measured import computed_section, data_section, named, subject_of
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import LAW_OF_USE
@@ -47,15 +47,14 @@ HOW_TO_READ = (
 )
 
 
-def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
-    """Return what a comparison of laws says; ``sources`` are the files that were read."""
+def law_result(study: LawStudy, beside: Path = Path()) -> Result:
+    """Return what a comparison of laws says; relative files of its settings lie in ``beside``."""
     comparison, settings, unit = study.comparison, study.settings, study.unit
     rows = [
         {"law": name} | {str(column): known_number(value) for column, value in row.items()}
         for name, row in comparison.table_in("MPa").iterrows()
     ]
-    inputs, files = inputs_of(settings, study.experiment, sources), table_files("laws", rows, MODULUS, unit)
-    discrepancy = settings.discrepancies[0]
+    files, discrepancy = table_files("laws", rows, MODULUS, unit), settings.discrepancies[0]
     caption = (
         f"Initial shear modulus under every law with the discrepancy '{discrepancy}': mean and 95 % interval, and the "
         "average by the laws' probabilities."
@@ -63,8 +62,8 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     law, names = study.recommended, list(comparison.fits)
     laws = " and ".join([", ".join(names[:-1]), names[-1]])
     answer = comparison.fits[law].answer
-    return Result(
-        command=f"fit{inputs.options}",
+    result = Result(
+        command="fit",
         title=f"{named(study.experiment)}: which law of {laws if len(names) <= FEW_LAWS else len(names)}",
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
@@ -75,10 +74,9 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         tables=(law_table(study),),
         sections=_sections(study),
         warnings=tuple(study.warnings),
-        files=inputs.files | data_file(study.experiment, unit) | files | posterior_files(comparison.fits),
-        recipe=inputs.recipe,
-        without=inputs.without,
+        files=data_file(study.experiment, unit) | files | posterior_files(comparison.fits),
     )  # fmt: skip
+    return with_inputs(result, study, beside)
 
 
 def _next_step(law: str, answer: Answer, *, is_of_all: bool) -> str:

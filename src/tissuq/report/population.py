@@ -7,25 +7,23 @@ from math import exp
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from tissuq.errors import TissuqError
-from tissuq.population.answer import ENDS, PopulationAnswer, answer_of_population, headline, patient_in_words
-from tissuq.population.patient import check_one_control
+from tissuq.population.answer import (
+    ENDS,
+    Measured,
+    PopulationAnswer,
+    answer_of_population,
+    headline,
+    patient_in_words,
+    stresses_where_measured,
+)
 from tissuq.population.picture import numbers_of
 from tissuq.population.warnings import far_specimens
-from tissuq.prediction.bands import Band
 from tissuq.report.inputs import Copies
 from tissuq.report.measured import specimens_section
-from tissuq.report.population_figures import (
-    Bands,
-    Measured,
-    headline_figure,
-    patient_figure,
-    specimens_figure,
-)
+from tissuq.report.population_figures import Bands, headline_figure, patient_figure, specimens_figure
 from tissuq.report.population_in_words import (
     FITTED_SEPARATELY,
+    QUANTITIES,
     between_specimens,
     effects_of_covariates,
     methods_of_population,
@@ -77,14 +75,6 @@ HOW_TO_READ = (
     "The spread of a positive parameter is a factor: two of three specimens lie between the median divided by it and "
     "the median times it. Files have its logarithm, the sd of the parameter's logarithm.",
 )
-POINTS = 81
-"""Of the stress of a new specimen."""
-QUANTITIES = {
-    "median": "median of the population",
-    "spread": "spread between specimens",
-    "new specimen": "a new specimen",
-    "complete pooling": "complete pooling",
-}
 
 
 def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
@@ -106,16 +96,14 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
     tables |= {"specimens_needed": needed} if (needed := needed_of(study)) is not None else {}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
-    bands, not_predicted = _bands(study)
+    bands, not_predicted = stresses_where_measured(population, (True, False))
     if bands:
         band_table = _band_table(bands, several) / unit.to_mpa
         tables["new_patient"] = band_table.rename(columns={name: f"{name} [{unit.name}]" for name in band_table})
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
     count = len(study.tests)
     modes = ", ".join(mode.name for mode in study.modes)
-    columns = ("stretch", "median", "low", "high")
-    predicted = [Band(*(of_mode[name].to_numpy(float) for name in columns)) for of_mode, _ in bands.values()]
-    answer = answer_of_population(population, unit, predicted)
+    answer = answer_of_population(population, unit, [band for band, _ in bands.values()])
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
@@ -222,36 +210,15 @@ def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
     return rows
 
 
-def _bands(study: PopulationStudy) -> tuple[dict[Measured, Bands], list[str]]:
-    """Return every measured stress of a new specimen, with the model error and without; and why some are not there."""
-    bands, not_predicted = dict[Measured, Bands](), []
-    for mode in study.modes:
-        ranges = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
-        reach = np.concatenate(ranges)
-        stretch = np.linspace(reach.min(), reach.max(), POINTS)
-        try:
-            check_one_control(mode)
-            for channel in range(len(mode.stresses)):
-                options: dict[str, Any] = {"mode": mode, "channel": channel, "unit": "MPa"}
-                band, material_alone = (
-                    study.population.new_patient(stretch, discrepancy=with_discrepancy, **options)
-                    for with_discrepancy in (True, False)
-                )
-                bands[mode, channel] = (band, material_alone)
-        except TissuqError as error:  # two controls, or some of the population's materials lock before the largest
-            not_predicted.append(f"{mode.name}: {error}")
-    return bands, not_predicted
-
-
 def _band_table(bands: Mapping[Measured, Bands], several: bool) -> pd.DataFrame:
     """Return the stresses of new specimens by stretch, and by mode and stress where there are several."""
     import pandas as pd
 
     has_stresses = any(len(mode.stresses) > 1 for mode, _ in bands)
     tables = {
-        (mode.name,) * several + (mode.stresses[channel],) * has_stresses: band.merge(
-            material_alone, on="stretch", suffixes=("", "_material_alone")
-        ).set_index("stretch")
+        (mode.name,) * several + (mode.stresses[channel],) * has_stresses: pd.DataFrame(vars(band))
+        .merge(pd.DataFrame(vars(material_alone)), on="stretch", suffixes=("", "_material_alone"))
+        .set_index("stretch")
         for (mode, channel), (band, material_alone) in bands.items()
     }
     names = ["mode"] * several + ["measured"] * has_stresses

@@ -10,22 +10,19 @@ import numpy as np
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
-from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
-from tissuq.population.answer import headline
+from tissuq.population.answer import Measured, headline
 from tissuq.population.picture import draw_specimens, height_of
+from tissuq.prediction.bands import Band
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from tissuq.population import Population
 
-Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
+Bands: TypeAlias = tuple[Band, ...]
 """Stress of a new specimen with the model error, and of the material alone."""
-Measured: TypeAlias = tuple[LoadingMode, int]
-"""A loading mode and the number of one of its stresses."""
 
 
 def headline_figure(population: Population, unit: StressUnit) -> Figure:
@@ -58,8 +55,8 @@ def patient_figure(population: Population, bands: Mapping[Measured, Bands], unit
     Parameters
     ----------
     population : Population
-    bands : mapping of LoadingMode and number of a stress to two pandas.DataFrame
-        From `Population.new_patient`, with the discrepancy and without; a panel each.
+    bands : mapping of LoadingMode and number of a stress to two of Band
+        Of `stresses_where_measured`, with the discrepancy and without; a panel each.
     unit : StressUnit
     """
     with new_figure(6.6 if len(bands) == 1 else min(4.6 * len(bands), 13.8), 4.2) as figure:
@@ -82,12 +79,10 @@ def _draw_patient(axis: Axes, population: Population, measured: Measured, bands:
         axis.plot(curve.points[order], curve.stress[order] / unit.to_mpa, color=BASE, lw=0.7, alpha=0.7,
                   label="" if index else "measured specimens")  # fmt: skip
     band, material_alone = bands
-    low, high = band["low"] / unit.to_mpa, band["high"] / unit.to_mpa
-    pieces.band(axis, band["stretch"], low, high, label="a new specimen, 95 %")
-    pieces.line(axis, band["stretch"], band["median"] / unit.to_mpa, width=1.8, label="median")
-    for end in ("low", "high"):
-        axis.plot(material_alone["stretch"], material_alone[end] / unit.to_mpa, ":", color=TRUTH, lw=1.4,
-                  label="" if end == "high" else "95 % of the material alone")  # fmt: skip
+    pieces.band(axis, band.stretch, band.low / unit.to_mpa, band.high / unit.to_mpa, label="a new specimen, 95 %")
+    pieces.line(axis, band.stretch, band.median / unit.to_mpa, width=1.8, label="median")
+    for end, label in ((material_alone.low, "95 % of the material alone"), (material_alone.high, "")):
+        axis.plot(material_alone.stretch, end / unit.to_mpa, ":", color=TRUTH, lw=1.4, label=label)
     axis.set_xlabel(mode.controls[0].name)
     axis.set_ylabel(f"{mode.stresses[channel]} [{unit.name}]")
     axis.set_title(mode.name)

@@ -142,7 +142,12 @@ def methods_of_population(study: PopulationStudy, answer: PopulationAnswer) -> S
 
 HEADERS_OF_EFFECTS = ["parameter", "covariate", "effect", "95 % interval", "positive"]
 HEADERS_OF_NUMBERS = ["parameter", "quantity", "now", "with any number", "specimens in all", "more"]
-QUANTITIES = {"median": "median of the population", "new specimen": "a new specimen"}
+QUANTITIES = {
+    "median": "median of the population",
+    "spread": "spread between specimens",
+    "new specimen": "a new specimen",
+    "complete pooling": "complete pooling",
+}
 
 
 def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:

@@ -41,21 +41,16 @@ SCORES = ("crps", "interval_score")
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
 
 
-def prediction_figure(prediction: Prediction) -> Figure:
+def prediction_figure(prediction: Prediction, width: float | None = None) -> Figure:
     """Return a row of panels for each stress: with the discrepancy, where it is known, and the material alone.
 
     The stretches outside the range that was measured are hatched.
     """
-    kinds = len(prediction.kinds)
-    return _figure(prediction, 4.9 * kinds + (1.6 if kinds == 1 else 0.4), 4 if kinds > 1 else 2)
-
-
-def _figure(prediction: Prediction, width: float, across: int) -> Figure:
     count, kinds = len(prediction.stresses), len(prediction.kinds)
-    with new_figure(width, 3.7 * count + 0.7) as figure:
+    with new_figure(width or 4.9 * kinds + (1.6 if kinds == 1 else 0.4), 3.7 * count + 0.7) as figure:
         axes = figure.subplots(count, kinds, squeeze=False, sharey="row", sharex=prediction.points.ndim == 1)
         draw_prediction(list(axes.ravel()), prediction)
-        legend_above(figure, axes.ravel(), across)
+        legend_above(figure, axes.ravel(), 4 if kinds > 1 else 2)
     return figure
 
 
@@ -109,7 +104,7 @@ def prediction_result(
         uses=_use_of_mode(prediction, beside / settings.run),
         next_step=_next_step(prediction, _named(settings, beside)),
         picture=Picture(
-            "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
+            "answer", lambda: prediction_figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH),
             f"Predicted bands of the stress in mode {prediction.mode.name}", _caption(prediction),
         ),
         tables=tuple(tables),

@@ -18,27 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import unbroken
-from tissuq.studies.settings import INPUT, RECIPE
+from tissuq.studies.settings import RECIPE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
     from pydantic import BaseModel
-
-__all__ = [
-    "ASSESSMENT",
-    "CONTENTS",
-    "INPUT",
-    "RECIPE",
-    "check_apart",
-    "check_target",
-    "run_folder",
-    "versions",
-    "write_figures",
-    "write_page",
-    "write_recipe",
-]
 
 ASSESSMENT = "assessment.json"
 """The file with the assessment of each discrepancy."""

@@ -16,7 +16,7 @@ from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described
 from tissuq.report.chart import chart_data
 from tissuq.report.figures import described_curves, marginal_figure, predictive_figure
-from tissuq.report.inputs import inputs_of
+from tissuq.report.inputs import with_inputs
 from tissuq.report.measured import computed_section, data_section, methods_section, named, subject_of
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import ASSESSMENT
@@ -78,9 +78,9 @@ def specimen_answer(study: SpecimenStudy) -> Result:
     )
 
 
-def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
-    """Return what a fit says; ``sources`` are the files that were read, one a test."""
-    inputs, unit, posteriors = inputs_of(study.settings, study.experiment, sources), study.unit, study.posteriors
+def specimen_result(study: SpecimenStudy, beside: Path = Path()) -> Result:
+    """Return what a fit says; relative files of its settings lie in ``beside``."""
+    unit, posteriors = study.unit, study.posteriors
     summary = []
     for name, posterior in posteriors.items():
         more: Row = {"estimand": posterior.model.tolerances.estimand, "noise_lag": posterior.model.fitted_errors.lag}
@@ -91,9 +91,8 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
     def computed() -> dict[str, Sequence[Described]]:
         return {name: described_curves(posterior) for name, posterior in posteriors.items()}
 
-    return replace(
+    result = replace(
         specimen_answer(study),
-        command=f"fit{inputs.options}",
         picture=Picture(
             "answer",
             lambda: answer_on_new_figure(computed()[study.main], unit, is_narrow=True),
@@ -103,10 +102,9 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
         ),
         tables=_tables(study, summary),
         sections=_sections(study, summary, partial(_predictive, study, computed)),
-        files=inputs.files | _files(study, summary),
-        recipe=inputs.recipe,
-        without=inputs.without,
+        files=_files(study, summary),
     )
+    return with_inputs(result, study, beside)
 
 
 def _files(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:

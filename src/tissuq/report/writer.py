@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints, is_
 
 from tissuq.errors import InputError
 from tissuq.report.result import RESULT, Record, Result, few_and_others
-from tissuq.report.run_folder import RECIPE, write_figures, write_page, write_recipe
+from tissuq.report.run_folder import write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, rows_of, write_csv, write_json
-from tissuq.studies.settings import DATA, damage_reported
+from tissuq.studies.settings import DATA, RECIPE, damage_reported
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
     from tissuq.experiments.units import StressUnit
     from tissuq.posterior.posterior import Posterior
-
-__all__ = ["contents_for_programs", "data_file", "posterior_files", "read_record", "write_result"]
 
 MAX_RUNS_NAMED = 5
 """Runs that a message names of a folder that holds several."""

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 WELL_EXPLAINED = 0.9
 """Share of the variance of a quantity of a model from which nothing need be said of the rest."""
 PREFIX = "ensemble:"
+"""Of a target that is a quantity of an ensemble: ``ensemble:FOLDER`` or ``ensemble:FOLDER:NAME``."""
 STATES_PER_MODE = 5
 """Stretches, over the measured strains, of every loading mode of which the stresses stand for the material."""
 
@@ -123,7 +124,7 @@ def run_design(
             "test would tell beside it is not known. Take a run of tissuq fit."
         )
     targets = tuple(
-        _ensemble_target(name, posterior, folder) if _names_ensemble(name) else target_named(name, posterior.model)
+        _ensemble_target(name, posterior, folder) if name.startswith(PREFIX) else target_named(name, posterior.model)
         for name in dict.fromkeys(settings.targets)
     )
     if len({target.name for target in targets}) < len(set(targets)):
@@ -134,14 +135,9 @@ def run_design(
     return DesignStudy(settings, posterior, targets, table, next_test.specimen, next_test.tolerances.stress)
 
 
-def _names_ensemble(text: str) -> bool:
-    """Return whether a target is a quantity of an ensemble: ``ensemble:FOLDER`` or ``ensemble:FOLDER:NAME``."""
-    return text.startswith(PREFIX)
-
-
 def with_folder(text: str, changed: Callable[[str], str]) -> str:
     """Return a target with the folder of its ensemble changed; any other as it is."""
-    if not _names_ensemble(text):
+    if not text.startswith(PREFIX):
         return text
     folder, name = _parts(text)
     return f"{PREFIX}{changed(folder)}" + (f":{name}" if name else "")

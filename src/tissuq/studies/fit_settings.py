@@ -118,6 +118,10 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
             raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
         return self
 
+    def sources(self, folder: Path) -> list[Path]:
+        """Return the file, or those of all tests."""
+        return [folder / test.file for test in self.tests or (self,)]
+
     def readings(self, folder: Path = Path(), found: Sequence[Reading | None] = ()) -> list[Reading]:
         """Return what is read from the file, or those of all tests, unless that is found."""
         tests = self.tests or (self,)

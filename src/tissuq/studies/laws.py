@@ -18,9 +18,9 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
-from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
+from tissuq.result_warning import ResultWarning, merged, most_severe_first
 from tissuq.studies.fit_settings import LawSettings
-from tissuq.studies.specimen import priors_in_mpa, shared_options
+from tissuq.studies.specimen import priors_in_mpa, shared_options, warnings_beside
 from tissuq.studies.stream import open_pool
 
 SIGNIFICANT_ERRORS = 2.0
@@ -88,17 +88,10 @@ class LawStudy:
 
         Those of other laws than the recommended one are notes.
         """
-        fits = self.comparison.fits
-        of_recommended = merged({self.recommended: fits[self.recommended].warnings_of_fit}, named=True)
-        of_others = merged(
-            {name: fit.warnings_of_fit for name, fit in fits.items() if name != self.recommended}, named=True
-        )
-        texts = [
-            *of_recommended,
-            *(text if text.severity is Severity.PROBLEM else text.as_note() for text in of_others),
-        ]
+        fits, law = self.comparison.fits, self.recommended
+        of_fits = [*merged({law: fits[law].warnings_of_fit}, named=True), *warnings_beside(law, fits)]
         of_data = measurement_warnings(self.experiment)
-        return most_severe_first([*of_data, *self.comparison.warnings_of_evidence, *texts])
+        return most_severe_first([*of_data, *self.comparison.warnings_of_evidence, *of_fits])
 
 
 def run_laws(

@@ -65,11 +65,7 @@ class SpecimenStudy:
 
         Those of fits beside the one that answers stand once with their names, and are notes: they concern a comparison.
         """
-        of_main = self.posteriors[self.main].warnings_of_fit
-        of_others = merged(
-            {name: fit.warnings_of_fit for name, fit in self.posteriors.items() if name != self.main}, named=True
-        )
-        beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
+        of_main, beside = self.posteriors[self.main].warnings_of_fit, warnings_beside(self.main, self.posteriors)
         of_evidence = warnings_of_evidence(
             {name: (fit.log_evidence, fit.log_evidence_error) for name, fit in self.posteriors.items()}
         )
@@ -100,6 +96,12 @@ class SpecimenStudy:
     def not_converged(self) -> list[str]:
         """Discrepancies with which sampling has not converged."""
         return [name for name, posterior in self.posteriors.items() if posterior.solution.is_approximate]
+
+
+def warnings_beside(answering: str, fits: Mapping[str, Posterior]) -> list[ResultWarning]:
+    """Return the warnings of other fits than the one that answers, each once with their names: notes, but problems."""
+    of_others = merged({name: fit.warnings_of_fit for name, fit in fits.items() if name != answering}, named=True)
+    return [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in of_others]
 
 
 def steps_of(settings: SpecimenSettings) -> int:
@@ -133,7 +135,7 @@ def run_specimen(
     unit = stress_unit(experiment.stress_unit)
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
-    priors = priors_in_mpa(settings, [material], experiment)
+    priors_in_mpa(settings, [material], experiment)  # which refuses those that no fit has
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
@@ -145,7 +147,7 @@ def run_specimen(
             )
             continue
         try:
-            options = _options(settings, material, priors, symbols[name], unit)
+            options = _options(settings, material, symbols[name], unit)
             posteriors[name] = fit(experiment, discrepancy=name, **options)
             seconds[name] = perf_counter() - start
         except (ConvergenceError, ModelError) as error:
@@ -172,7 +174,7 @@ def run_specimen(
                 "this discrepancy is a separate error of the stress in each test."
             )
             continue
-        options = _options(settings, material, priors, symbols[name], unit)
+        options = _options(settings, material, symbols[name], unit)
         fitted = posteriors[name].model
         options |= {"tolerances": fitted.tolerances, "discrepancy": fitted.discrepancy}
         try:
@@ -200,25 +202,14 @@ def fitted(
     experiment = settings.experiment(folder)
     material, unit = law or material_named(settings.material), stress_unit(experiment.stress_unit)
     parameters = parameters_of(settings, material, discrepancy, experiment)
-    applicable = {
-        symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in parameters]
-    }
-    applicable_settings = settings.model_copy(update={"priors": applicable, "discrepancies": (discrepancy,)})
-    priors = priors_in_mpa(applicable_settings, [material], experiment)
-    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
+    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, parameters, unit))
 
 
 def _options(
-    settings: SpecimenSettings,
-    material: Material,
-    priors: Mapping[str, Prior],
-    parameters: tuple[Parameter, ...],
-    unit: StressUnit,
+    settings: SpecimenSettings, material: Material, parameters: Iterable[Parameter], unit: StressUnit
 ) -> dict[str, Any]:
     """Return the options of a fit but the discrepancy."""
-    parameter_names = {p.symbol for p in parameters}
-    of_fit = {symbol: prior for symbol, prior in priors.items() if symbol in parameter_names}
-    return {"material": material, "priors": of_fit, **shared_options(settings, unit)}
+    return {"material": material, "priors": _priors(settings, parameters, unit), **shared_options(settings, unit)}
 
 
 def shared_options(settings: SpecimenSettings, unit: StressUnit) -> dict[str, Any]:
@@ -264,10 +255,14 @@ def priors_in_mpa(settings: SpecimenSettings, laws: Iterable[Material], experime
         raise InputError(
             f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(parameters_by_name)}."
         )
-    return {
-        symbol: prior_from(prior).scaled(unit.to_mpa if parameters_by_name[symbol].unit else 1.0)
-        for symbol, prior in settings.priors.items()
-    }
+    return _priors(settings, parameters_by_name.values(), unit)
+
+
+def _priors(settings: SpecimenSettings, parameters: Iterable[Parameter], unit: StressUnit) -> dict[str, Prior]:
+    """Return those of the chosen priors that are of some parameters, from a unit of stress in MPa and stretch."""
+    scales = {p.symbol: unit.to_mpa if p.unit else 1.0 for p in parameters}
+    chosen = {symbol: prior for symbol, prior in settings.priors.items() if symbol in scales}
+    return {symbol: prior_from(prior).scaled(scales[symbol]) for symbol, prior in chosen.items()}
 
 
 def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> pd.DataFrame:
