@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -133,36 +133,8 @@ class AdaptedPoints:
 
 
 def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> Mixture:
-    """Return a mixture with a part around each peak that is reached from good points of the prior far apart.
-
-    And around each place on the way, where a climb along a narrow bent ridge began again in its width there: such a
-    ridge has parts all along.
-    """
-    from scipy.special import ndtri
-
-    points = ndtri(even_points(dimension, SURVEY_POINTS))
-    values = log_density(points)
-    feet: list[FloatArray] = []
-    for index in np.argsort(-values):
-        if all(np.linalg.norm(points[index] - foot) > LEAST_DISTANCE for foot in feet):
-            feet.append(points[index])
-        if len(feet) == CLIMBS:
-            break
-
-    peaks, roots = np.array(feet), np.repeat(np.eye(dimension)[None], len(feet), axis=0)
-    last_heights, parts = np.full(len(feet), -np.inf), list[tuple[float, Proposal]]()
-    for _ in range(MAX_CLIMBS):
-        evaluate, at_peaks = partial(_along, log_density, peaks, roots), np.zeros((1, *peaks.shape))
-        steps, heights, curvatures = (ends[0] for ends in climb(evaluate, at_peaks, -UNBOUNDED, UNBOUNDED))
-        peaks = peaks + (roots @ steps[:, :, None])[:, :, 0]
-        covariances = roots @ np.linalg.inv(curvatures) @ roots.swapaxes(1, 2)
-        roots = np.asarray(np.linalg.cholesky(covariances), dtype=np.float64)
-        log_masses = heights + 0.5 * np.linalg.slogdet(covariances)[1]
-        parts += zip(log_masses.tolist(), map(Proposal, peaks, roots), strict=True)
-        is_relevant = log_masses >= log_masses.max() - RELEVANT_LOG_DROP
-        if not (is_relevant & (heights > last_heights + CLIMBED_HEIGHT)).any():
-            break
-        last_heights = heights
+    """Return a mixture with a part around each place to which a climb from a good point of the prior has come."""
+    parts = list(_climbed(log_density, _feet(log_density, dimension)))
     largest = max(log_mass for log_mass, _ in parts)
     relevant = list[Proposal]()
     for log_mass, part in parts:
@@ -170,6 +142,39 @@ def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: in
         if log_mass >= largest - RELEVANT_LOG_DROP and all(np.linalg.norm(score) > COINCIDENT for score in scores):
             relevant.append(part)
     return [(1 / len(relevant), part) for part in relevant]
+
+
+def _feet(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> FloatArray:
+    """Return good points (K, d) of the prior far apart."""
+    from scipy.special import ndtri
+
+    points, feet = ndtri(even_points(dimension, SURVEY_POINTS)), list[FloatArray]()
+    for index in np.argsort(-log_density(points)):
+        if all(np.linalg.norm(points[index] - foot) > LEAST_DISTANCE for foot in feet):
+            feet.append(points[index])
+        if len(feet) == CLIMBS:
+            break
+    return np.array(feet)
+
+
+def _climbed(log_density: Callable[[FloatArray], FloatArray], peaks: FloatArray) -> Iterator[tuple[float, Proposal]]:
+    """Yield places to which climbs from points (K, d) come, with Gaussians of the width there and their log masses.
+
+    Along a narrow bent ridge climbs begin again, in steps of the width where the last ended: it has places all along.
+    """
+    roots, last_heights = np.repeat(np.eye(peaks.shape[1])[None], len(peaks), axis=0), np.full(len(peaks), -np.inf)
+    for _ in range(MAX_CLIMBS):
+        evaluate, at_peaks = partial(_along, log_density, peaks, roots), np.zeros((1, *peaks.shape))
+        steps, heights, curvatures = (ends[0] for ends in climb(evaluate, at_peaks, -UNBOUNDED, UNBOUNDED))
+        peaks = peaks + (roots @ steps[:, :, None])[:, :, 0]
+        covariances = roots @ np.linalg.inv(curvatures) @ roots.swapaxes(1, 2)
+        roots = np.asarray(np.linalg.cholesky(covariances), dtype=np.float64)
+        log_masses = heights + 0.5 * np.linalg.slogdet(covariances)[1]
+        yield from zip(log_masses.tolist(), map(Proposal, peaks, roots), strict=True)
+        is_relevant = log_masses >= log_masses.max() - RELEVANT_LOG_DROP
+        if not (is_relevant & (heights > last_heights + CLIMBED_HEIGHT)).any():
+            return
+        last_heights = heights
 
 
 def _along(
