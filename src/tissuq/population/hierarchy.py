@@ -8,15 +8,16 @@ In the coordinates of `likelihoods`, with d pooled parameters and the likelihood
 where x_i are the columns of the specimen's covariates, if there are any (`covariates`).
 
 A Gaussian of a likelihood times N(m + B x_i, S) integrates in closed form, so that only m, B, tau and Omega are
-sampled: no funnel, and as many dimensions for fifty specimens as for three. Each theta_i is then drawn exactly, given
-these.
+sampled: as many dimensions for fifty specimens as for three. What is left of the funnel, a mean that is free where the
+spread is large, goes with the scale of m: it is sampled as (m - c) / sqrt(tau² + s²), where c is the middle of the
+specimens and s what each of them leaves open. Each theta_i is then drawn exactly, given these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import isqrt
 from typing import Any
 
@@ -146,10 +147,18 @@ def sample_hierarchy(
     upper = np.r_[np.full(2 * size, np.inf), np.ones(len(pairs)), unbounded]
     start = np.r_[np.zeros(size), np.full(size, 0.3 * spread), np.zeros(len(pairs)), np.zeros(len(effects))]
     design = jnp.asarray(covariates.design)
-    data = coarse | {"spread": jnp.asarray(spread), "design": design}
+    middles, covariances = map(np.array, zip(*(mixture.moments() for mixture in mixtures), strict=True))
+    data = coarse | {
+        "spread": jnp.asarray(spread),
+        "design": design,
+        "centre": jnp.asarray(middles.mean(axis=0)),
+        "width": jnp.sqrt(jnp.asarray(np.einsum("ikk->k", covariances) / len(mixtures))),
+    }
     for thinning in THINNINGS:
         settings = NutsSettings(draws=DRAWS_PER_CHAIN, thinning=thinning, seed=seed)
-        sampled = sample_nuts(_log_posterior, lower, upper, start, settings, [*names, *effects], data)
+        scores = sample_nuts(_log_posterior_of_scores, lower, upper, start, settings, [*names, *effects], data)
+        values = jax.vmap(jax.vmap(partial(_with_mean, data=data)))(jnp.asarray(scores.values))
+        sampled = scores.of(np.asarray(values), scores.names)
         hierarchy = _corrected(sampled, coarse, fine, design, seed + 1)
         if hierarchy.diagnostics.converged:
             break
@@ -199,6 +208,23 @@ def _parted(position: Any, columns: int) -> tuple[Any, Any]:
 def _size(position: Any) -> int:
     """Return how many parameters have a mean, a spread and a correlation with each other in a point."""
     return (isqrt(9 + 8 * int(position.shape[0])) - 3) // 2
+
+
+def _log_posterior_of_scores(position: Any, data: Any) -> Any:
+    """Return the log density of a population at a point with scores of the mean in its place."""
+    return _log_posterior(_with_mean(position, data), data) + jnp.log(_scale(position, data)).sum()
+
+
+def _with_mean(position: Any, data: Any) -> Any:
+    """Return a point with the mean in place of its scores."""
+    size = len(data["centre"])
+    return position.at[:size].set(data["centre"] + _scale(position, data) * position[:size])
+
+
+def _scale(position: Any, data: Any) -> Any:
+    """Return what the scores (d,) of the mean are multiplied with."""
+    size = len(data["centre"])
+    return jnp.sqrt(position[size : 2 * size] ** 2 + data["width"] ** 2)
 
 
 def _log_posterior(position: Any, data: Any) -> Any:

@@ -31,8 +31,7 @@ from tissuq.inference.coordinates import (
 MIN_ESS_PER_CHAIN = 100
 MAX_DIVERGENT_SHARE = 0.002
 """Few as they are, they may tell of a place that no chain enters: along a curved ridge with 16 to 34 of 8000, all else
-was well, and sds came out up to 30 % too small. Fits have none or one; populations with a small spread have up to 1.5
-in a thousand, and agree with quadrature."""
+was well, and sds came out up to 30 % too small. Fits and populations have none, or up to one in a thousand."""
 MIN_BFMI = 0.3
 SEPARATE_RHAT = 1.2
 """An R-hat that slow chains hardly reach, but chains in different modes do."""
