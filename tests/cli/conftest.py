@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -61,6 +62,7 @@ def cli(here, monkeypatch, capsys) -> Cli:
 
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["tissuq", *map(str, arguments)])
+        monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)  # which the command sets
         capsys.readouterr()
         with pytest.raises(SystemExit) as end:
             main()

@@ -220,3 +220,16 @@ def test_an_option_under_its_former_name_is_the_same(cli):
     assert today.status == former.status == 2
     assert former.err == today.err
     assert "--measurements" in today.err
+
+
+def test_a_warning_of_another_package_is_one_sentence(tmp_path):
+    package = tmp_path / "broken-1.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Name: broken\nVersion: 1\n")
+    (package / "entry_points.txt").write_text("[tissuq.modes]\nbroken = no_such_module:Mode\n")
+    said = subprocess.run(
+        [sys.executable, "-c", "from tissuq.cli import main; main()", "modes"],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=True,
+    ).stderr  # fmt: skip
+    assert said.startswith("tissuq: 'broken' of another package")
+    assert said.count("\n") == 1

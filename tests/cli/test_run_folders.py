@@ -10,6 +10,7 @@ import pytest
 
 from marks import slow_but
 from tissuq import datasets
+from tissuq.report.run_folder import check_target, run_folder
 
 from .conftest import tree
 
@@ -224,3 +225,48 @@ def test_a_list_of_contents_that_is_no_text_is_no_reason_to_replace_a_run(cli, h
     said = cli("fit", specimen, *options, "--force")
     assert said.status == 2
     assert "also contains files that do not belong to the run" in said.err
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from tissuq.report.run_folder import run_folder
+
+def write(text, rename=Path.rename):
+    with run_folder(Path("out"), "fit", force=True) as folder:
+        (folder / "text").write_text(text)
+        Path.rename = rename
+
+def killed(path, target):
+    os._exit(9)
+
+def killed_between(path, target, rename=Path.rename):
+    return rename(path, target) if str(target).endswith("-earlier") else os._exit(9)
+
+def killed_after(path, target, rename=Path.rename):
+    rename(path, target)
+    if not str(target).endswith("-earlier"):
+        os._exit(9)
+
+write("first")
+write("second", {"while": killed, "between": killed_between, "after": killed_after}[sys.argv[1]])
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders have no locks there")
+@pytest.mark.parametrize(("moment", "kept"), [("while", "first"), ("between", "first"), ("after", "second")])
+def test_what_a_killed_command_left_is_taken_away_by_the_next_and_an_earlier_run_is_put_back(here, moment, kept):
+    assert subprocess.run([sys.executable, "-c", KILLED, moment], cwd=here, check=False).returncode == 9
+    assert any(path.name.startswith(".out-") for path in here.iterdir())
+    foreign = here / ".out-pictures"
+    foreign.mkdir()
+    check_target(here / "out", "fit", force=True)
+    assert {path.name for path in here.iterdir()} == {"out", foreign.name}
+    assert (here / "out" / "text").read_text() == kept
+
+
+def test_what_another_command_is_writing_is_left_alone(here):
+    with run_folder(here / "out", "fit") as folder:
+        check_target(here / "out", "fit", force=True)
+        assert folder.is_dir()
+    assert (here / "out").is_dir()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial, reduce
+from functools import reduce
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,10 +15,10 @@ from scipy.stats import norm, truncnorm
 import tissuq as tq
 from tissuq.assessment.uses import COMPUTING, Use, Verdict
 from tissuq.population import answer
-from tissuq.population.answer import PopulationAnswer, use_of_law_alone
+from tissuq.population.answer import use_of_law_alone
+from tissuq.population.next_step import STEPS_OF_POPULATIONS, next_step
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
-from tissuq.report.population_in_words import next_step_of
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3])
@@ -490,37 +490,51 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     (warning,) = _far_specimens(population)
     assert warning.severity == Severity.PROBLEM
     assert "the initial modulus of soft is 0.0053 times that of the other specimens" in warning
-    of = partial(PopulationAnswer, ())
-    assert next_step_of(population, of(())).startswith("look at soft first")
+    population.hierarchy = SimpleNamespace(effective=1.0, diagnostics=SimpleNamespace(converged=True))
+    for fit in (*fits.values(), population.complete):
+        fit.solution = SimpleNamespace(is_approximate=False)
+
+    def said_next(uses, without=(), share=0.0, **aim):
+        return next_step(population, uses, share, without, **aim).shell
+
+    assert said_next(()).startswith("look at soft first")
     without_unit = ResultWarning("the unit of the stress is not stated.", "doubtful-reading", Severity.PROBLEM)
     fits["soft"].model = model_of_tests(without_unit)
-    assert next_step_of(population, of(())).startswith("say what the files do not")
+    assert said_next(()).startswith("say what the files do not")
     population.posteriors.pop("soft")
-    assert "finite elements" in next_step_of(population, of((), share=0.2))
-    assert next_step_of(population, of((), share=0.3)).startswith("fit another law (--material) before you compute")
+    assert "finite elements" in said_next((), share=0.2)
+    assert said_next((), share=0.3).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
-    assert "--aim 20%" in next_step_of(population, of(useless))
-    assert next_step_of(population, of(useless), has_aim=True).startswith("find out what sets the specimens apart")
-    assert next_step_of(population, of(useless, share=0.3), has_aim=True).startswith("fit another law")
+    assert "--aim 20%" in said_next(useless)
+    assert said_next(useless, has_aim=True).startswith("find out what sets the specimens apart")
+    assert said_next(useless, has_aim=True, share=0.3).startswith("fit another law")
     not_predicted = [Use(PREDICTING, Verdict.NO, NOT_PREDICTED)]
-    assert "finite elements" in next_step_of(population, of(not_predicted))
+    assert "finite elements" in said_next(not_predicted)
     at_rest = ResultWarning("there is stress.", "stress-at-rest")
     fits["a"].model = model_of_tests(at_rest)
-    said = next_step_of(population, of(useless), ["d"])
+    said = said_next(useless, ["d"])
     assert said.startswith("take off what the load cell shows at rest in a, as the warning about it says")
     assert said.endswith("or leave it out: --without d --without a")
     fits["b"].model = model_of_tests(at_rest)
-    assert next_step_of(population, of(useless)).startswith("take off what the load cell shows at rest, as the warning")
+    assert said_next(useless).startswith("take off what the load cell shows at rest, as the warning")
     fits["a"].model = fits["b"].model = model_of_tests()
     apart, departing = ([Use(PREDICTING, Verdict.NO, reason)] for reason in (CONTRADICTING, DEPARTING))
-    assert next_step_of(population, of(apart)).startswith("find out why the tests of a specimen contradict")
-    assert next_step_of(population, of(departing)).endswith("--discrepancy auto")
+    assert said_next(apart).startswith("find out why the tests of a specimen contradict")
+    assert said_next(departing).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = True
-    assert next_step_of(population, of(useless)).endswith("--discrepancy auto")
+    assert said_next(useless).endswith("--discrepancy auto")
     population.complete.model.discrepancy.is_best_fit = False
-    assert next_step_of(population, of(useless, share=0.3)).startswith("fit another law")
+    assert said_next(useless, share=0.3).startswith("fit another law")
     population.summary = lambda: {"median": {("C10", "spread"): 1.5}}
-    assert next_step_of(population, of(())).startswith("find out why the specimens differ so much")
+    assert said_next(()).startswith("find out why the specimens differ so much")
+
+
+def test_the_steps_in_python_name_no_option_of_the_shell():
+    for step in STEPS_OF_POPULATIONS.values():
+        assert "--" not in step.python
+        assert "tissuq " not in step.python
+    answer = neo_hookean(specimens_of(MODULI)).answer
+    assert str(answer).splitlines()[-1] == f"Next: {answer.next_step.python}"
 
 
 def test_what_leaves_the_discrepancy_out_serves_where_that_carries_little():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from io import TextIOWrapper
 from typing import Annotated, Any
 
@@ -88,6 +89,7 @@ UNREAD = 141
 def main() -> None:
     """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
     end_on_request()
+    warnings.formatwarning = _in_words
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that shows no ± shows a ? instead
@@ -106,6 +108,11 @@ def main() -> None:
         if end.code in (INTERRUPTED, TERMINATED) and not isinstance(end, Stopped):
             typer.echo("tissuq: stopped; no run was written.", err=True)
         raise
+
+
+def _in_words(message: Warning | str, *place: Any, **line: Any) -> str:
+    """Return a warning without the place in the program, of which it says nothing to a person."""
+    return f"tissuq: {message}\n"
 
 
 def _nobody_reads(end: SystemExit) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.modulus import modulus_symbols
+from tissuq.assessment.next_step import Step
 from tissuq.assessment.shares import shares_of_discrepancy
 from tissuq.assessment.uses import COMPUTING, PRECISE, Use, Verdict
 from tissuq.errors import TissuqError
@@ -18,6 +19,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.draws import PopulationDraws
+from tissuq.population.next_step import next_step
 from tissuq.population.patient import check_one_control, patient_band
 from tissuq.population.picture import numbers_of
 from tissuq.population.uses import NOT_PREDICTED, share_of_initial_stiffness, uses_of_population
@@ -52,6 +54,7 @@ class PopulationAnswer:
         What is to be expected of a new specimen, the median of the population, and the spread between specimens.
     uses : tuple of Use
         Reporting the modulus of the tissue, predicting a new specimen, and finite elements with one.
+    next_step : Step
     law : str
         Where the law by itself does not describe the measurements: how much of the stress the discrepancy carries.
     share : float
@@ -60,22 +63,28 @@ class PopulationAnswer:
 
     estimates: tuple[PopulationEstimate, ...]
     uses: tuple[Use, ...]
+    next_step: Step
     law: str = ""
     share: float = 0.0
 
     def __str__(self) -> str:
+        """Return the answer as lines, with what to do next as typed in Python."""
         lines = [
             f"{name} {median:.3g}{f' {unit}' * bool(unit)}, 95 % interval {low:.3g} to {high:.3g}"
             for name, median, low, high, unit in self.estimates
         ]
         lines += [self.law] * bool(self.law)
-        return "\n".join([*lines, *(f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses)])
+        lines += [f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses]
+        return "\n".join([*lines, f"Next: {self.next_step.python}"])
 
 
 def answer_of_population(
     population: PopulationDraws,
     shown: StressUnit | None = None,
     bands: Iterable[Band] | None = None,
+    without: Sequence[str] = (),
+    *,
+    has_aim: bool = False,
 ) -> PopulationAnswer:
     """Return the answer that a population gives.
 
@@ -85,6 +94,10 @@ def answer_of_population(
         That of the estimates, unless it is that of the population.
     bands : iterable of Band, optional
         The stress of a new specimen where specimens were measured, where it is known already.
+    without : sequence of str
+        Specimens that were left out.
+    has_aim : bool
+        Whether the number of specimens that an aim takes is told beside.
     """
     words, times = headline(population)
     symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
@@ -107,7 +120,9 @@ def answer_of_population(
         bands = [band for (band,) in stresses_where_measured(population, (True,))[0].values()]
     uses = uses_of_population(population, [*bands], "modulus" if words == MODULUS else words)
     law = about_law(population, share) + about_modulus(population, share, words)
-    return PopulationAnswer(estimates, (*uses, use_of_law_alone(share, uses[-1])), law.strip(), share)
+    uses = (*uses, use_of_law_alone(share, uses[-1]))
+    step = next_step(population, uses, share, without, has_aim=has_aim)
+    return PopulationAnswer(estimates, uses, step, law.strip(), share)
 
 
 def patient_in_words(population: PopulationDraws, known: Mapping[str, Any] | None = None) -> str:

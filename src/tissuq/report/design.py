@@ -48,6 +48,8 @@ NEXT = (
     "make the first of these tests{whose}{again}, and fit it together with the data: "
     "tissuq fit DATA.csv NEW.csv{options}"
 )
+USUAL = ("neo-hookean", "auto")
+"""What a fit has of which nothing else is said."""
 OR_AGAIN, AS_MUCH = " (the same test again lowers it as much)", 0.01
 """What is said of a repeat of the data, and by how much of the sd now another test must be better."""
 BEYOND = UNSTABLE
@@ -56,7 +58,7 @@ SDS = ("sd_now", "sd_after")
 
 
 def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
-    """Return what to do, with the estimand for which the expected reduction holds, and the modes of both files."""
+    """Return what to do: the fit for which the expected reduction holds, with the modes of both files."""
     model, is_other = study.posterior.model, study.specimen == "other"
     tolerances, tests = model.tolerances, model.experiment.tests
     estimand = TISSUE if is_other and tolerances.estimand == SPECIMEN else tolerances.estimand
@@ -69,7 +71,9 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     is_as_much = len(again) and again.iloc[-1]["reduction"] > best["reduction"] - AS_MUCH
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
     whose = " on another specimen" * is_other
-    test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=modes + errors)
+    used = {"material": model.material.name, "discrepancy": model.discrepancy.name}
+    fitted = "".join(f" --{option} {name}" for option, name in used.items() if name not in USUAL)
+    test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=fitted + modes + errors)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
 

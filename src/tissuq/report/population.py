@@ -29,7 +29,6 @@ from tissuq.report.population_in_words import (
     methods_of_population,
     needed_of,
     needed_table_of,
-    next_step_of,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.tables import Row, interval, rows_of, significant, with_named_units
@@ -103,7 +102,9 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
     count = len(study.tests)
     modes = ", ".join(mode.name for mode in study.modes)
-    answer = answer_of_population(population, unit, [band for band, _ in bands.values()])
+    answer = answer_of_population(
+        population, unit, [band for band, _ in bands.values()], settings.without, has_aim=needed is not None
+    )
     return Result(
         command="population" + (f" --material {law}" if law != settings.material else ""),
         title=f"{population.complete.model.material.name} parameters of a population of {count} specimens",
@@ -111,7 +112,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         numbers=tuple(Number(*estimate) for estimate in answer.estimates),
         finding=" ".join(filter(None, (_lead(study, answer), answer.law))),
         uses=answer.uses,
-        next_step=next_step_of(population, answer, settings.without, has_aim=needed is not None),
+        next_step=answer.next_step.shell,
         picture=Picture(
             "answer", lambda: headline_figure(population, unit),
             f"{headline(population)[0].capitalize()} of every specimen", _about_specimens(population),

@@ -1,19 +1,14 @@
-"""What a page says of covariates of a population and of numbers of specimens, and what to do next."""
+"""What a page says of covariates of a population and of numbers of specimens, and its methods."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib.metadata import version
 from math import isnan
 from typing import TYPE_CHECKING
 
-from tissuq.assessment.uses import PRECISE, Verdict
-from tissuq.population import Population
 from tissuq.population.answer import PopulationAnswer
 from tissuq.population.draws import ALL_COVARIATES
 from tissuq.population.sample_size import MAX_SPECIMENS
-from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
-from tissuq.population.warnings import far_specimens, specimens_with
 from tissuq.report.measured import (
     INTRODUCTION,
     LAW,
@@ -34,70 +29,6 @@ FITTED_SEPARATELY = (
     "Every specimen was fitted separately, with its own discrepancy and noise and wide priors, which are then divided "
     "out (Lunn et al. 2013)."
 )
-WIDE_SPREAD = 1.0
-"""Sd of the logarithms, a factor of 2.7, from which specimens differ too much for one range to be of use."""
-
-
-def next_step_of(
-    population: Population,
-    answer: PopulationAnswer,
-    already_without: Sequence[str] = (),
-    *,
-    has_aim: bool = False,
-) -> str:
-    """Return what to do next: mend what is doubtful of files and specimens before anything is computed with them.
-
-    With an aim, the page has the number that it takes.
-    """
-    if not population.converged:
-        return "sample again, with another --seed; see the first warning"
-    if specimens_with(population, "doubtful-reading"):
-        return "say what the files do not, as the warning about what was read asks, and fit again"
-    if far := list(far_specimens(population)):
-        options = " ".join(f"--without {name}" for name in (*already_without, *far))
-        return (
-            f"look at {', '.join(far)} first: the unit of the stresses, the area, slack, the columns. Then fit again, "
-            f"or leave {'it' if len(far) == 1 else 'them'} out: {options}"
-        )
-    if at_rest := specimens_with(population, "stress-at-rest"):
-        if 2 * len(at_rest) < len(population.posteriors):
-            options = " ".join(f"--without {name}" for name in (*already_without, *at_rest))
-            return (
-                f"take off what the load cell shows at rest in {', '.join(at_rest)}, as the warning about it says, and "
-                f"fit again, or leave {'it' if len(at_rest) == 1 else 'them'} out: {options}"
-            )
-        return "take off what the load cell shows at rest, as the warning about it says, and fit again"
-    if population.complete.model.discrepancy.is_best_fit:
-        return "let the data decide how wrong the material is: fit again with --discrepancy auto"
-    reasons = {use.reason for use in answer.uses}
-    if CONTRADICTING in reasons:
-        return "find out why the tests of a specimen contradict each other: tissuq fit of one says which, and how much"
-    if DEPARTING in reasons:
-        if not population.complete.model.discrepancy.parameters:
-            return "let the data decide how wrong the material is: fit again with --discrepancy auto"
-        return "see what the fits do not follow: tissuq fit of one specimen says what to do about it"
-    spread = float(population.summary()["median"][population.symbols[0], "spread"])
-    if population.coordinates.is_log[0] and spread > WIDE_SPREAD:
-        return (
-            "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
-            "compute with a new one"
-        )
-    if answer.share > PRECISE:
-        return (
-            "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
-            "out; tissuq fit FILE --material all of one specimen says which"
-        )
-    against = [use.reason for use in answer.uses if use.purpose == PREDICTING and use.verdict is Verdict.NO]
-    if any(reason != NOT_PREDICTED for reason in against):
-        if has_aim:
-            return (
-                "find out what sets the specimens apart (--covariates); how many it takes stands beneath the parameters"
-            )
-        return (
-            "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
-            "sets them apart (--covariates)"
-        )
-    return "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)"
 
 
 def between_specimens(study: PopulationStudy) -> str:

@@ -10,6 +10,7 @@ from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
+from glob import escape
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -34,6 +35,8 @@ CONTENTS = "contents.txt"
 it does not list are foreign."""
 COMMAND_LINE = "# tissuq "
 """What that line begins with."""
+WRITTEN, EARLIER = ".tissuq", "-earlier"
+"""What the names of folders beside a run's end with while it is written: its own, and that of the run it replaces."""
 
 
 def check_target(target: Path, command: str, *, force: bool) -> None:
@@ -46,6 +49,7 @@ def check_target(target: Path, command: str, *, force: bool) -> None:
         command made, or when it cannot be created.
     """
     try:
+        _clear(Path(os.path.realpath(target)))
         _check(target, command, force)
     except OSError as error:
         raise _not_written(target, error) from error
@@ -79,10 +83,13 @@ def run_folder(target: Path, command: str, *, force: bool = False) -> Iterator[P
     target_path = Path(os.path.realpath(target))
     missing = [folder for folder in target_path.parents if not folder.exists()]
     scratch: Path | None = None
+    lock: int | None = None
     try:
         target_path.parent.mkdir(parents=True, exist_ok=True)
         scratch = Path(mkdtemp(prefix=f".{target_path.name}-", dir=target_path.parent))
         scratch.chmod(0o755)
+        lock = _lock(scratch)  # before it has a name that others clear
+        scratch = scratch.rename(scratch.with_name(f"{scratch.name}{WRITTEN}"))
         yield scratch
         lines = [f"{COMMAND_LINE}{command}", *_files(scratch)]
         (scratch / CONTENTS).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
@@ -93,6 +100,8 @@ def run_folder(target: Path, command: str, *, force: bool = False) -> Iterator[P
     finally:
         if scratch is not None and scratch.exists():
             shutil.rmtree(scratch, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
         for folder in missing:
             with suppress(OSError):
                 folder.rmdir()
@@ -153,7 +162,7 @@ def _put(scratch: Path, target: Path) -> None:
     if not target.exists():
         scratch.rename(target)
         return
-    earlier = target.with_name(f"{scratch.name}-earlier")
+    earlier = target.with_name(f"{scratch.name}{EARLIER}")
     target.rename(earlier)
     try:
         scratch.rename(target)
@@ -161,6 +170,41 @@ def _put(scratch: Path, target: Path) -> None:
         earlier.rename(target)
         raise
     shutil.rmtree(earlier, ignore_errors=True)
+
+
+def _clear(target: Path) -> None:
+    """Take away what commands that were killed left beside a run folder, and put back a run that one had moved."""
+    pattern = f".{escape(target.name)}-????????{WRITTEN}"
+    for earlier in target.parent.glob(f"{pattern}{EARLIER}"):
+        scratch = earlier.with_name(earlier.name.removesuffix(EARLIER))
+        if scratch.exists() and not target.exists() and (lock := _lock(scratch)) is not None:
+            earlier.rename(target)
+            os.close(lock)
+        elif target.exists() and not scratch.exists():
+            shutil.rmtree(earlier, ignore_errors=True)
+    for scratch in target.parent.glob(pattern):
+        if (lock := _lock(scratch)) is not None:
+            shutil.rmtree(scratch, ignore_errors=True)
+            os.close(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """Return a lock of a folder, which lasts until it is closed or this process ends.
+
+    None where another process has it, or where there are none, as on Windows and some network disks.
+    """
+    try:
+        from fcntl import LOCK_EX, LOCK_NB, flock
+
+        handle = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        return None
+    try:
+        flock(handle, LOCK_EX | LOCK_NB)
+    except OSError:
+        os.close(handle)
+        return None
+    return handle
 
 
 def _not_written(target: Path, error: OSError) -> InputError:
