@@ -48,8 +48,8 @@ NEXT = (
     "make the first of these tests{whose}{again}, and fit it together with the data: "
     "tissuq fit DATA.csv NEW.csv{options}"
 )
-USUAL = ("neo-hookean", "auto")
-"""What a fit has of which nothing else is said."""
+DEFAULTS = ("neo-hookean", "auto")
+"""Material and discrepancy of a fit that are not named in its command."""
 OR_AGAIN, AS_MUCH = " (the same test again lowers it as much)", 0.01
 """What is said of a repeat of the data, and by how much of the sd now another test must be better."""
 BEYOND = UNSTABLE
@@ -72,7 +72,7 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
     whose = " on another specimen" * is_other
     used = {"material": model.material.name, "discrepancy": model.discrepancy.name}
-    fitted = "".join(f" --{option} {name}" for option, name in used.items() if name not in USUAL)
+    fitted = "".join(f" --{option} {name}" for option, name in used.items() if name not in DEFAULTS)
     test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=fitted + modes + errors)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
