@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np
@@ -37,22 +38,12 @@ class Inspection:
     ----------
     reading : Reading
         The experiment and what was done on the way to it.
-    noise_sds : tuple of float or None
-        Estimate of the noise of the engineering stress, MPa, of each stress of the loading mode; None where the
-        measurements do not show it.
     worded : callable
         How notes are worded: as they are, or in Python's terms.
     """
 
     reading: Reading
-    noise_sds: tuple[float | None, ...]
     worded: Callable[[str], str] = str
-
-    @classmethod
-    def of(cls, reading: Reading, worded: Callable[[str], str] = str) -> Inspection:
-        """Return what was understood of a file that has been read."""
-        course, stresses = reading.used.course, reading.used.stress
-        return cls(reading, tuple(noise_between_neighbours(course, stress) for stress in stresses), worded)
 
     @property
     def line(self) -> str:
@@ -70,6 +61,12 @@ class Inspection:
         """What the measured stresses are along: stretch, or amount of shear."""
         name = self.reading.experiment.mode.abscissa_control.name
         return "stretch" if "stretch" in name else name
+
+    @cached_property
+    def noise_sds(self) -> tuple[float | None, ...]:
+        """The noise of each stress of the loading mode, MPa; None where the measurements do not show it."""
+        used = self.reading.used
+        return tuple(noise_between_neighbours(used.course, stress) for stress in used.stress)
 
     @property
     def noise_sd(self) -> float | None:
@@ -199,7 +196,7 @@ def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
     """
     with refusals_worded_for(path):
         reading = read_file(path, **options)
-        return Inspection.of(reading, wording_for(path, reading.experiment.stress_unit))
+        return Inspection(reading, wording_for(path, reading.experiment.stress_unit))
 
 
 def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:
