@@ -97,8 +97,8 @@ class Inspection:
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
-        cells = f", separated by {SEPARATORS[table.separator]}; rows in lines {_span(table.lines)}, {head}"
-        spans_of_rows = f"; {table.counted}s {_span(table.lines)}, counted from {int(table.counted != 'row')}"
+        cells = f", separated by {SEPARATORS[table.separator]}; rows in {table.span}, {head}"
+        spans_of_rows = f"; {table.span}, counted from {int(table.counted != 'row')}"
         yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else spans_of_rows}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
@@ -166,14 +166,14 @@ class Inspection:
         )
 
     def _cycle_table(self) -> Iterator[str]:
-        cycles, stretch = self.reading.cycles, self.reading.recorded.course
+        cycles, stretch, lines = self.reading.cycles, self.reading.recorded.course, self.reading.table.lines
         mean = "mean " * (len(self.reading.used.stretch) > 1)
         yield f"{f'cycle     {self.reading.table.counted}s':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
         for number, cycle in list(enumerate(cycles, start=1))[:MAX_CYCLES_SHOWN]:
             rows = cycle.rows()
             ends = (stretch[row] for row in (rows[0], cycle.peak, rows[-1]))
             label = "" if cycle.label == str(number) else cycle.label
-            span = _span(self.reading.table.lines[rows[0] : rows[-1] + 1])
+            span = f"{lines[rows[0]]} to {lines[rows[-1]]}"
             yield f"{number:<9} {span:<18}" + "".join(f"{end:>13.4f}" for end in ends) + f"  {label}".rstrip()
         if len(cycles) > MAX_CYCLES_SHOWN:
             yield f"... {len(cycles)} cycles in all"
@@ -233,10 +233,6 @@ def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:
 def _typed(measure: str) -> str:
     """Return the name of a measure of strain or stress before what it is of; nothing of the engineering one."""
     return "" if measure == "engineering" else f"{measure} "
-
-
-def _span(lines: Sequence[int]) -> str:
-    return f"{lines[0]} to {lines[-1]}"
 
 
 def _wrapped(label: str, text: str) -> str:
