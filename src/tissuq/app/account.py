@@ -151,7 +151,7 @@ def _curve(reading: Reading, number: int) -> dict[str, Any]:
     used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
     regions = [
         {"kind": region.kind, **_points(used.stretch[number][region.rows], used.stress[number][region.rows], unit)}
-        for region in reading.regions[number]
+        for region in reading.tested[number].regions
         if len(region.rows)
     ]
     return {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Unpack, cast
 
@@ -30,14 +29,7 @@ from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_c
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice, adding
-from tissuq.experiments.reading.regions import (
-    AUTO,
-    Region,
-    TestedStress,
-    least_errors,
-    regions_of,
-    tested_stresses,
-)
+from tissuq.experiments.reading.regions import AUTO, TestedStress, least_errors, tested_stresses
 from tissuq.experiments.reading.rows_of_tests import (
     SeveralSpecimens,
     columns_only,
@@ -115,11 +107,6 @@ class Reading:
     def used_cycles(self) -> Sequence[Cycle]:
         """The cycles of the rows of the experiment."""
         return self.tested[0].cycles
-
-    @cached_property
-    def regions(self) -> list[list[Region]]:
-        """What happened in the test besides elastic loading, as each stress shows it."""
-        return [regions_of(tested) for tested in self.tested]
 
 
 def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
