@@ -10,6 +10,7 @@ from planted import CLEAN, LAWS, PLANTED, STIFFENING, rates
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
 from tissuq.experiments.reading.disturbances import find_drift, find_outliers, find_saturation, staircase_of, step_of
+from written_files import written
 
 ALL_LAWS = [*LAWS, *STIFFENING]
 WAY = np.linspace(0, 1, 121)
@@ -18,9 +19,7 @@ WAY = np.linspace(0, 1, 121)
 @pytest.fixture
 def inspected(tmp_path):
     def inspect(stretch, stress, **options):
-        path = tmp_path / "test.csv"
-        rows = "".join(f"{a:.6f},{b:.6f}\n" for a, b in zip(stretch, stress, strict=True))
-        path.write_text("stretch,stress [kPa]\n" + rows)
+        path = written(tmp_path, "stretch,stress [kPa]", stretch, stress, form="{:.6f}".format)
         return tq.inspect(path, **options)
 
     return inspect
