@@ -218,7 +218,8 @@ def tables_of(file: Path, reading: Mapping[str, Any]) -> list[Table]:
 
     path = file if file.exists() else Path(str(file).partition("#")[0])
     try:
-        return list(read_tables(path, reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")))
+        skip_rows, sheet, number = reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")
+        return read_tables(path, skip_rows=skip_rows, sheet=sheet, table=number)
     except InputError:
         return []
 

@@ -114,17 +114,12 @@ def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     if (mode := plain.get("mode")) is not None:
         checked_mode(mode, plain)
-    table = table_of(path, plain)
+    table = read_table(path, **plain)
     rows = only_rows(table, columns_only(table, plain.get("only")))
     reading = read_rows(rows, table.file if is_data_frame(path) else path, **plain)
     if refusal := other_label(table, reading.experiment, plain.get("only")):
         raise InputError(refusal)
     return reading
-
-
-def table_of(path: Any, options: ReadingOptions) -> Table:
-    """Return the table of a file that the options choose."""
-    return read_table(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
 
 
 def read_rows(
