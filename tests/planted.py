@@ -181,7 +181,7 @@ def kinds_found(curve: Curve, folder: Path) -> set[str]:
     path = folder / "test.csv"
     rows = [f"{stretch:.6f},{stress:.6f}\n" for stretch, stress in zip(*map(np.ndarray.tolist, curve), strict=True)]
     path.write_text("stretch,stress [kPa]\n" + "".join(rows))
-    return {region.kind for region in tq.inspect(path).reading.regions[0]}
+    return {region.kind for region in tq.inspect(path).reading.tested[0].regions}
 
 
 def rates(name: str, count: int, seed: int, laws: list[str], noise: float | None = None) -> Counter[str]:

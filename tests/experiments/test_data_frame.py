@@ -9,8 +9,9 @@ import pytest
 import xarray as xr
 
 import tissuq as tq
-from tissuq.experiments.reading.options import PARTS, PythonOptions
+from tissuq.experiments.reading.options import PARTS
 from tissuq.experiments.reading.tables import read_table
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
 
 Q = pint.UnitRegistry().Quantity
 STRETCH = np.r_[np.linspace(1, 1.3, 14), np.linspace(1.28, 1, 14)]
@@ -197,8 +198,8 @@ def test_a_fit_of_files_and_tables_is_that_of_their_experiments(is_file, tmp_pat
     assert of_many.marginals["C10"].mean == expected.marginals["C10"].mean
 
 
-def test_every_part_of_an_option_is_an_option_of_its_own():
-    assert PARTS.keys() <= PythonOptions.__annotations__.keys()
+def test_every_role_of_a_tube_and_every_dimension_is_an_option_of_its_own():
+    assert PARTS.keys() >= {*ROLES_OF_TUBE, *DIMENSION_NAMES}
 
 
 def test_cells_with_their_unit_are_read_as_those_of_a_file():

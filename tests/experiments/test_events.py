@@ -8,6 +8,7 @@ import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.experiments import datasets
 from tissuq.experiments.reading.disturbances import ends_of_rests, find_holds, find_rupture
+from written_files import written
 
 LAWS = {
     "neo-hookean": lambda share: 1.4 * share - (1.4 * share) ** 2 / 3,
@@ -111,9 +112,7 @@ def test_a_single_outlier_is_no_rupture():
 @pytest.fixture
 def inspected(tmp_path):
     def inspect(stretch, stress, **options):
-        path = tmp_path / "test.csv"
-        rows = "".join(f"{a:.6f},{b:.6f}\n" for a, b in zip(stretch, stress, strict=True))
-        path.write_text("stretch,stress [MPa]\n" + rows)
+        path = written(tmp_path, "stretch,stress [MPa]", stretch, stress, form="{:.6f}".format)
         return tq.inspect(path, **options)
 
     return inspect

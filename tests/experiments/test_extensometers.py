@@ -8,6 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
+from written_files import written
 
 STRETCH = np.linspace(1, 1.3, 50)
 SIZES = {"length": "10 mm", "area": "6 mm2"}
@@ -15,13 +16,11 @@ MACHINE_STRAIN = 1.5
 """Displacement of the machine over that of the specimen, whose grips slip."""
 
 
-def written(folder, machine, local):
+def of_both(folder, machine, local):
     strain = STRETCH - 1
     values = 100 * strain if "%" in local else 10 * strain
-    rows = zip(10 * MACHINE_STRAIN * strain, values, 6 * neo_hookean(STRETCH), strict=True)
-    path = folder / "test.csv"
-    path.write_text(f"{machine},{local},Load (N)\n" + "".join(f"{a:.9f},{b:.9f},{c:.9f}\n" for a, b, c in rows))
-    return path
+    columns = 10 * MACHINE_STRAIN * strain, values, 6 * neo_hookean(STRETCH)
+    return written(folder, f"{machine},{local},Load (N)", *columns)
 
 
 @pytest.mark.parametrize("machine", ["Crosshead (mm)", "Extension (mm)"])
@@ -41,7 +40,7 @@ def written(folder, machine, local):
     ],
 )
 def test_the_measurement_on_the_specimen_is_offered_in_the_form_that_reads_it(tmp_path, machine, local, role):
-    path = written(tmp_path, machine, local)
+    path = of_both(tmp_path, machine, local)
     with pytest.raises(InputError, match="They give different stretches") as error:
         tq.read_experiment(path, dimensions=SIZES)
     assert f'--column {role}="{local}"' in str(error.value)
@@ -71,10 +70,8 @@ def test_an_extensometer_beside_the_machine_is_asked_about_in_each_of_several_te
 
 
 def test_the_strain_of_an_extensometer_beside_that_of_the_machine_is_asked_about(tmp_path):
-    path = tmp_path / "test.csv"
-    rows = zip(MACHINE_STRAIN * (STRETCH - 1), STRETCH - 1, 1e3 * neo_hookean(STRETCH), strict=True)
-    lines = [",".join(f"{value:.9f}" for value in row) for row in rows]
-    path.write_text("\n".join(["Strain (mm/mm),Strain Ex1 (mm/mm),Stress (kPa)", *lines]))
+    columns = MACHINE_STRAIN * (STRETCH - 1), STRETCH - 1, 1e3 * neo_hookean(STRETCH)
+    path = written(tmp_path, "Strain (mm/mm),Strain Ex1 (mm/mm),Stress (kPa)", *columns)
     with pytest.raises(InputError, match="They give different stretches") as error:
         tq.read(path)
     assert '--column strain="Strain Ex1 (mm/mm)"' in str(error.value)
@@ -83,7 +80,7 @@ def test_the_strain_of_an_extensometer_beside_that_of_the_machine_is_asked_about
 
 @pytest.mark.parametrize("local", ["Temperature (C)", "Gauge length (mm)"])
 def test_what_is_no_deformation_raises_no_question(tmp_path, local):
-    path = written(tmp_path, "Crosshead (mm)", "Extensometer (mm)")
+    path = of_both(tmp_path, "Crosshead (mm)", "Extensometer (mm)")
     lines = path.read_text().replace("Extensometer (mm)", local).splitlines()
     rows = [f"{a},20.0,{c}" for a, _, c in (line.split(",") for line in lines[1:])]
     path.write_text("\n".join([lines[0], *rows]))
@@ -101,9 +98,8 @@ DISTANCE = 812.0
 @pytest.mark.parametrize("stated", ["", "812 px", "812 pixel"])
 def test_distances_of_marks_in_pixels_over_the_undeformed_one_are_stretches(tmp_path, name, stated):
     stretch = np.linspace(1, 1.3, 40)
-    path = tmp_path / "test.csv"
     columns = DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
-    path.write_text("\n".join([f"{name};Force (N)", *map("{:.9f};{:.9f}".format, *columns)]))
+    path = written(tmp_path, f"{name};Force (N)", *columns, separator=";")
     data = tq.read(path, area="10 mm2", length=stated or None)
     np.testing.assert_allclose(data.stretch, stretch, rtol=1e-9)
     np.testing.assert_allclose(data.stress, columns[1] / 10, atol=1e-9)
@@ -112,9 +108,8 @@ def test_distances_of_marks_in_pixels_over_the_undeformed_one_are_stretches(tmp_
 
 def test_distances_in_pixels_that_begin_under_load_are_asked_about_and_the_advice_reads_them(tmp_path):
     stretch = np.linspace(1.1, 1.3, 40)
-    path = tmp_path / "test.csv"
     columns = DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
-    path.write_text("\n".join(["Gauge length: 20 mm", "Marks (px);Force (N)", *map("{:.9f};{:.9f}".format, *columns)]))
+    path = written(tmp_path, "Gauge length: 20 mm\nMarks (px);Force (N)", *columns, separator=";")
     with pytest.raises(
         InputError, match=r"with 3\d % of the largest load. Give the undeformed distance in pixels: --length"
     ):
@@ -126,10 +121,8 @@ def test_distances_in_pixels_that_begin_under_load_are_asked_about_and_the_advic
 
 def test_pixels_beside_the_displacement_of_the_machine_are_asked_about(tmp_path):
     stretch = np.linspace(1, 1.3, 40)
-    path = tmp_path / "test.csv"
     columns = 25 * (stretch - 1), DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
-    rows = [",".join(map("{:.9f}".format, row)) for row in zip(*columns, strict=True)]
-    path.write_text("\n".join(["Displacement (mm),Marker distance (px),Force (N)", *rows]))
+    path = written(tmp_path, "Displacement (mm),Marker distance (px),Force (N)", *columns)
     with pytest.raises(InputError, match=r'--column length="Marker distance \(px\)"'):
         tq.read(path, area="10 mm2", length="20 mm")
     data = tq.read(path, area="10 mm2", columns={"length": "Marker distance (px)"})

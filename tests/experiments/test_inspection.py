@@ -6,15 +6,13 @@ import pytest
 import tissuq as tq
 from machine_files import biotester, cycles, instron, neo_hookean, wintest
 from tissuq.experiments.reading.inspection import noise_between_neighbours
+from written_files import written
 
 
 @pytest.fixture
 def inspected(tmp_path):
     def inspect(stretch, stress, heading="stretch,stress [kPa]", **options):
-        path = tmp_path / "test.csv"
-        rows = "".join(f"{a:.9g},{b:.9g}\n" for a, b in zip(stretch, stress, strict=True))
-        path.write_text(f"{heading}\n{rows}")
-        return tq.inspect(path, **options)
+        return tq.inspect(written(tmp_path, heading, stretch, stress, form="{:.9g}".format), **options)
 
     return inspect
 
@@ -164,9 +162,8 @@ def test_a_protocol_of_several_ratios_is_no_repetition(tmp_path, repeats):
     first, second = 1 + strains.T
     third = 1 / (first * second)
     stress = [2 * (along - third**2 / along) for along in (first, second)]
-    rows = "".join(",".join(map(repr, map(float, row))) + "\n" for row in zip(first, second, *stress, strict=True))
-    (tmp_path / "sheet.csv").write_text(f"stretch x,stretch y,stress x (kPa),stress y (kPa)\n{rows}")
-    warnings = tq.inspect(tmp_path / "sheet.csv").warnings
+    path = written(tmp_path, "stretch x,stretch y,stress x (kPa),stress y (kPa)", first, second, *stress)
+    warnings = tq.inspect(path).warnings
     assert "--cycle last" not in " ".join(warnings)
     assert any("all 6 cycles are used, which have 3 ratios" in text for text in warnings) is (repeats == 2)
 
@@ -195,9 +192,8 @@ def test_a_stretch_of_the_other_axis_that_is_not_free_is_doubted(tmp_path, ratio
     along = np.linspace(1, 1.3, 20)
     across = along**-ratio
     column = {"stretch y": across, "strain y [%]": 100 * (across - 1), "strain yy": across - 1}[heading]
-    rows = "".join(f"{a:.6f},{b:.6f},{1e3 * (a - a**-2):.6f}\n" for a, b in zip(along, column, strict=True))
-    (tmp_path / "x.csv").write_text(f"stretch x,{heading},stress x (kPa)\n{rows}")
-    text = notes(tq.inspect(tmp_path / "x.csv", axis="x", mode="uniaxial"))
+    path = written(tmp_path, f"stretch x,{heading},stress x (kPa)", along, column, 1e3 * (along - along**-2))
+    text = notes(tq.inspect(path, axis="x", mode="uniaxial"))
     assert ("does not become narrower" in text) is is_doubted
 
 

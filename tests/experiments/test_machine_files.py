@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 
 from machine_files import LAYOUTS, biotester, instron, instron_compression, univert, wintest, zwick
-from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.read import read_experiment
-
-
-def message(path, **options):
-    with pytest.raises(InputError) as caught:
-        read_experiment(path, **options)
-    return str(caught.value)
+from written_files import message
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

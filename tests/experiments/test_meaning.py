@@ -8,18 +8,13 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
+from written_files import written
 
 L = ramp()
 P = 1e3 * neo_hookean(L)  # kPa
 SIZES = {"length": "10 mm", "area": "4 mm2"}
 D = 10 * (L - 1)  # mm
 N = P * 4e-3  # N
-
-
-def written(folder, name, head, *columns):
-    rows = [",".join(f"{value:.8g}" for value in row) for row in zip(*columns, strict=True)]
-    (folder / name).write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
-    return folder / name
 
 
 def check(path, expected="uniaxial", stretch=L, stress=P, **options):
@@ -45,7 +40,7 @@ def check(path, expected="uniaxial", stretch=L, stress=P, **options):
     ],
 )
 def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, head, columns):
-    check(written(tmp_path, "test.csv", head, *columns))
+    check(written(tmp_path, head, *columns))
 
 
 @pytest.mark.parametrize(
@@ -63,7 +58,7 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
     ],
 )
 def test_displacements_and_forces_are_known_by_many_names(tmp_path, head):
-    path = written(tmp_path, "test.csv", f"Total Cycles,{head},Elapsed Cycles", 1 + 0 * L, D, N, np.arange(len(L)))
+    path = written(tmp_path, f"Total Cycles,{head},Elapsed Cycles", 1 + 0 * L, D, N, np.arange(len(L)))
     check(path, dimensions=SIZES)
 
 
@@ -77,18 +72,18 @@ def test_displacements_and_forces_are_known_by_many_names(tmp_path, head):
     ],
 )
 def test_strains_and_stresses_are_known_in_many_languages_beside_forces(tmp_path, head):
-    check(written(tmp_path, "test.csv", f"{head},x (mm),F (N)", 100 * (L - 1), P, D, N))
+    check(written(tmp_path, f"{head},x (mm),F (N)", 100 * (L - 1), P, D, N))
 
 
 def test_empty_columns_of_stress_and_strain_are_not_read_beside_forces(tmp_path):
-    path = written(tmp_path, "test.csv", "Force (N),Displacement (mm),Stress (kPa),Strain", N, D, 0 * L, 0 * L)
+    path = written(tmp_path, "Force (N),Displacement (mm),Stress (kPa),Strain", N, D, 0 * L, 0 * L)
     check(path, dimensions=SIZES)
 
 
 def test_directions_in_a_wall_are_axes(tmp_path):
     names = "Circumferential stretch,Axial stretch,Circumferential Cauchy stress (kPa),Axial Cauchy stress (kPa)"
     across = 1 + (L - 1) / 2
-    path = written(tmp_path, "artery.csv", names, L, across, L * P, across * P / 2)
+    path = written(tmp_path, names, L, across, L * P, across * P / 2, name="artery.csv")
     check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1))
 
 
@@ -99,7 +94,7 @@ def test_a_letter_beside_two_axes_is_a_stress_by_its_unit(tmp_path, names, stres
     across, symbols = 1 + (L - 1) / 2, names.split(",")
     divisors = (L, across) if stress_type else (1, 1)
     heads = f"lambda_1,lambda_2,{symbols[0]} (kPa),{symbols[1]} (kPa)"
-    path = written(tmp_path, "sheet.csv", heads, L, across, P / divisors[0], P / 2 / divisors[1])
+    path = written(tmp_path, heads, L, across, P / divisors[0], P / 2 / divisors[1], name="sheet.csv")
     options = {} if stress_type is None else {"stress_type": stress_type}
     stretch, stress = np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1)
     check(path, "biaxial", stretch, stress, mode="biaxial", **options)
@@ -109,15 +104,15 @@ def test_a_letter_beside_two_axes_is_a_stress_by_its_unit(tmp_path, names, stres
 
 
 def test_a_plane_that_slides_over_another_is_sheared(tmp_path):
-    path = written(tmp_path, "shear.csv", "Shear displacement (mm),Shear force (N)", D, N)
+    path = written(tmp_path, "Shear displacement (mm),Shear force (N)", D, N, name="shear.csv")
     check(path, "simple-shear", L - 1, dimensions=SIZES)
-    path = written(tmp_path, "any.csv", "d (mm),F (N)", D, N)
+    path = written(tmp_path, "d (mm),F (N)", D, N, name="any.csv")
     check(path, "simple-shear", L - 1, dimensions=SIZES, columns={"sliding": 1, "force": 2})
 
 
 @pytest.mark.parametrize("name", ["T19_PureShear.csv", "pure_shear_3.csv", "liver planar.csv"])
 def test_pure_shear_is_planar(tmp_path, name):
-    check(written(tmp_path, name, "Stretch,Stress (kPa)", L, P), "planar")
+    check(written(tmp_path, "Stretch,Stress (kPa)", L, P, name=name), "planar")
 
 
 @pytest.mark.parametrize(
@@ -175,7 +170,7 @@ def test_pure_shear_is_planar(tmp_path, name):
 )
 @pytest.mark.filterwarnings("ignore:column")
 def test_what_is_open_is_asked_about_and_the_advice_reads_it(tmp_path, name, head, columns, words, options):
-    path = written(tmp_path, name, head, *columns)
+    path = written(tmp_path, head, *columns, name=name)
     sizes = {"dimensions": SIZES} if "mm)" in head else {}
     with pytest.raises(InputError) as refusal:
         tq.read_tests(path, **sizes)
@@ -184,7 +179,7 @@ def test_what_is_open_is_asked_about_and_the_advice_reads_it(tmp_path, name, hea
 
 
 def test_a_height_in_percent_is_no_length(tmp_path):
-    path = written(tmp_path, "test.csv", "Height (mm),Height (%),Stress (kPa)", 10 * L, 100 * L, P)
+    path = written(tmp_path, "Height (mm),Height (%),Stress (kPa)", 10 * L, 100 * L, P)
     check(path, length="10 mm")
 
 
@@ -199,7 +194,7 @@ def test_columns_without_names_are_asked_for_in_roles_that_the_mode_has(tmp_path
 
 def test_a_strain_beyond_1_that_is_called_a_stretch_is_told_by_where_its_stress_is_least(tmp_path):
     stretch = np.linspace(1.02, 4, 30)
-    path = written(tmp_path, "test.csv", "Stretch,Stress (kPa)", stretch - 1, 1e3 * neo_hookean(stretch))
+    path = written(tmp_path, "Stretch,Stress (kPa)", stretch - 1, 1e3 * neo_hookean(stretch))
     with pytest.raises(
         InputError, match=r"0.02 where the stress is least\) look like strain, not stretch.*strain=Stre"
     ):
@@ -212,14 +207,14 @@ def test_a_gel_that_breaks_far_in_compression_is_read(tmp_path):
     stretch, stress = np.linspace(1, 0.3, 30), 1e3 * neo_hookean(np.linspace(1, 0.3, 30))
     stress += -0.5
     stress[-2:] = -0.1
-    check(written(tmp_path, "test.csv", "Stretch,Stress (kPa)", stretch, stress), stretch=stretch, stress=stress)
+    check(written(tmp_path, "Stretch,Stress (kPa)", stretch, stress), stretch=stretch, stress=stress)
 
 
 def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_reads_it(tmp_path):
-    path = written(tmp_path, "shear_1.csv", "Shear,Stress (kPa)", L, P)
+    path = written(tmp_path, "Shear,Stress (kPa)", L, P, name="shear_1.csv")
     with pytest.raises(InputError, match=r"If 1 was added to it, take that off; .* --mode planar"):
         tq.read(path)
-    check(written(tmp_path, "shear_2.csv", "Shear,Stress (kPa)", L - 1, P), "simple-shear", L - 1)
+    check(written(tmp_path, "Shear,Stress (kPa)", L - 1, P, name="shear_2.csv"), "simple-shear", L - 1)
     check(path, "planar", mode="planar", columns={"stretch": 1})
 
 
@@ -231,7 +226,7 @@ def test_an_amount_of_shear_that_is_1_at_rest_is_asked_about_and_the_advice_read
     ],
 )
 def test_a_force_over_1_mm2_is_asked_about_of_tests_side_by_side_too(tmp_path, names, count):
-    path = written(tmp_path, "export.csv", names, L - 1, N, N, L - 1, 2 * N, 2 * N)
+    path = written(tmp_path, names, L - 1, N, N, L - 1, 2 * N, 2 * N, name="export.csv")
     strain, force, stress = names.split(",")[:3]
     advice = (
         f'--column strain="{strain}" --column force="{force}", and the --area .*{strain}" --column stress="{stress}"'
@@ -245,19 +240,19 @@ def test_a_force_over_1_mm2_is_asked_about_of_tests_side_by_side_too(tmp_path, n
 
 
 def test_an_area_of_1_mm2_that_is_meant_is_read_as_stated(tmp_path):
-    path = written(tmp_path, "test.csv", "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
+    path = written(tmp_path, "Strain,Force (N),Stress (MPa)", L - 1, 1e-3 * P, 1e-3 * P)
     check(path, columns={"strain": 1, "stress": "Stress (MPa)"})
 
 
 def test_compression_that_is_named_is_not_read_as_tension(tmp_path):
-    path = written(tmp_path, "compression_1.csv", "Displacement (mm),Force (N)", 10 * (1 - 1 / L), N)
+    path = written(tmp_path, "Displacement (mm),Force (N)", 10 * (1 - 1 / L), N, name="compression_1.csv")
     with pytest.raises(InputError, match="--compression-positive"):
         tq.read_tests(path, dimensions=SIZES)
     check(path, stretch=1 / L, stress=-P, dimensions=SIZES, compression_positive=True)
 
 
 def test_displacements_of_compression_may_be_positive_and_forces_negative(tmp_path):
-    path = written(tmp_path, "test.csv", "Displacement (mm),Force (N)", 10 * (1 - 1 / L), -N)
+    path = written(tmp_path, "Displacement (mm),Force (N)", 10 * (1 - 1 / L), -N)
     with pytest.raises(InputError, match="--compression-positive"):
         tq.read_tests(path, dimensions=SIZES)
     check(path, stretch=1 / L, stress=-P, dimensions=SIZES, compression_positive=True)
@@ -265,7 +260,7 @@ def test_displacements_of_compression_may_be_positive_and_forces_negative(tmp_pa
 
 def test_what_a_rheometer_sheared_is_not_read_as_tension(tmp_path):
     head = "Geometry name,20mm parallel plate\nStep time,Strain,Stress,Torque\ns,%,Pa,uN.m"
-    path = written(tmp_path, "stress growth.csv", head, L, 100 * (L - 1), 1000 * P, P)
+    path = written(tmp_path, head, L, 100 * (L - 1), 1000 * P, P, name="stress growth.csv")
     with pytest.raises(InputError, match=r"line 1 says .*parallel plate.* --mode simple-shear"):
         tq.read_tests(path)
     check(path, "simple-shear", L - 1, mode="simple-shear")
@@ -274,7 +269,7 @@ def test_what_a_rheometer_sheared_is_not_read_as_tension(tmp_path):
 @pytest.mark.parametrize("beside", ["Normal force", "Normalkraft", "Gap", "Torque"])
 def test_strains_and_stresses_beside_what_a_rheometer_writes_are_asked_about(tmp_path, beside):
     head = f"Time (s),Strain (%),Stress (Pa),{beside}"
-    path = written(tmp_path, "export.csv", head, L, 100 * (L - 1), 1000 * P, P)
+    path = written(tmp_path, head, L, 100 * (L - 1), 1000 * P, P, name="export.csv")
     with pytest.raises(InputError, match=rf"{beside}'.* --mode simple-shear.* --mode uniaxial"):
         tq.read_tests(path)
     check(path, "simple-shear", L - 1, mode="simple-shear")
@@ -284,7 +279,10 @@ def test_strains_and_stresses_beside_what_a_rheometer_writes_are_asked_about(tmp
 def test_components_of_tensors_are_of_axes_once_their_measures_are_said(tmp_path):
     across = 1 + (L - 1) / 2
     path = written(
-        tmp_path, "sheet.csv", "E11,E22,S11 (kPa),S22 (kPa)", (L**2 - 1) / 2, (across**2 - 1) / 2, P / L, P / across
+        tmp_path,
+        "E11,E22,S11 (kPa),S22 (kPa)",
+        *((L**2 - 1) / 2, (across**2 - 1) / 2, P / L, P / across),
+        name="sheet.csv",
     )
     options = {}
     for words, option in (
@@ -300,11 +298,11 @@ def test_components_of_tensors_are_of_axes_once_their_measures_are_said(tmp_path
 
 @pytest.mark.parametrize("head", ["Stretch λ [-],Stress [kPa]", "λ [-],Spannung σ [kPa]", "Streckung λ,Stress σ (kPa)"])
 def test_a_symbol_after_a_name_leaves_it_what_it_is(tmp_path, head):
-    check(written(tmp_path, "test.csv", head, L, P))
+    check(written(tmp_path, head, L, P))
 
 
 def test_a_displacement_in_simple_shear_is_asked_about_as_sliding_and_the_advice_reads_it(tmp_path):
-    path = written(tmp_path, "test.csv", "Displacement (mm),Force (N)", 10 * (L - 1), N)
+    path = written(tmp_path, "Displacement (mm),Force (N)", 10 * (L - 1), N)
     options = {"mode": "simple-shear", "dimensions": SIZES}
     with pytest.raises(InputError, match="--column sliding=NAME"):
         tq.read(path, **options)
@@ -312,7 +310,7 @@ def test_a_displacement_in_simple_shear_is_asked_about_as_sliding_and_the_advice
 
 
 def test_a_name_that_stands_twice_is_asked_about_in_its_role(tmp_path):
-    path = written(tmp_path, "test.csv", "Strain (%),Strain (%),Stress (kPa)", 100 * (L - 1), 50 * (L - 1), P)
+    path = written(tmp_path, "Strain (%),Strain (%),Stress (kPa)", 100 * (L - 1), 50 * (L - 1), P)
     with pytest.raises(InputError, match=r"several columns may be the strain: .* --column strain=NAME"):
         tq.read(path, columns={"strain": "Strain (%)"})
 
@@ -336,7 +334,7 @@ def test_two_stretches_and_two_forces_are_of_both_axes_of_a_sheet_whose_sizes_ar
     for name in names.replace("1", "x").replace("2", "y").split(","):
         axis = name.removesuffix(" (N)")[-1]
         columns.append(values[axis]["N" in name])
-    path = written(tmp_path, "sheet.csv", names, *columns)
+    path = written(tmp_path, names, *columns, name="sheet.csv")
     check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1), dimensions=SHEET)
 
 
@@ -349,6 +347,6 @@ def test_two_stretches_and_two_forces_are_of_both_axes_of_a_sheet_whose_sizes_ar
     ],
 )
 def test_numbers_that_may_be_those_of_specimens_are_asked_about(tmp_path, names, options):
-    path = written(tmp_path, "sheet.csv", names, L, L, P, P)
+    path = written(tmp_path, names, L, L, P, P, name="sheet.csv")
     with pytest.raises(InputError, match=r"mode='biaxial'.* If numbers in the names are of two specimens"):
         tq.read(path, **options)

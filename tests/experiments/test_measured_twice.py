@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from written_files import by_name, written
 
 LENGTH, AREA = 20.0, 10.0  # mm, mm2
 STRAIN = np.linspace(0, 0.3, 31)
 STRETCH = 1 + STRAIN
 STRESS = 2 * 0.05 * (STRETCH - STRETCH**-2)  # MPa
 SIZES = {"length": f"{LENGTH:g} mm", "area": f"{AREA:g} mm2"}
-
-
-def written(path, separator=",", **columns):
-    lines = [separator.join(columns)]
-    lines += [separator.join(f"{value:.7g}" for value in row) for row in zip(*columns.values(), strict=True)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 def asked(path, **options):
@@ -39,7 +33,7 @@ def asked(path, **options):
 )
 def test_a_strain_of_the_specimen_beside_the_crosshead_is_asked_about(tmp_path, name, role, values):
     crosshead = 1.4 * LENGTH * STRAIN  # the grips slip, so that the machine moves farther
-    path = written(tmp_path / "test.csv", **{"Crosshead (mm)": crosshead, "Load (N)": STRESS * AREA, name: values})
+    path = by_name(tmp_path, **{"Crosshead (mm)": crosshead, "Load (N)": STRESS * AREA, name: values})
     choices = asked(path, **SIZES)
     assert choices == [("displacement", "Crosshead (mm)"), (role, name)]
     specimen = tq.read(path, columns=dict([choices[1]]), area=SIZES["area"])
@@ -53,16 +47,16 @@ def test_a_strain_of_the_specimen_beside_the_crosshead_is_asked_about(tmp_path, 
 def test_two_strains_of_which_one_is_of_a_camera_are_asked_about(tmp_path, first, second):
     scale = 100 if "%" in first else 1
     columns = {first: 1.4 * scale * STRAIN, second: scale * STRAIN, "Stress (kPa)": 1000 * STRESS}
-    path = written(tmp_path / "test.csv", **columns)
+    path = by_name(tmp_path, **columns)
     assert asked(path) == [("strain", first), ("strain", second)]
     np.testing.assert_allclose(tq.read(path, columns={"strain": second}).stretch, STRETCH, rtol=1e-5)
-    same = written(tmp_path / "same.csv", **columns | {first: scale * STRAIN})
-    np.testing.assert_allclose(tq.read(same).stretch, STRETCH, rtol=1e-5)
+    path = by_name(tmp_path, **columns | {first: scale * STRAIN})
+    np.testing.assert_allclose(tq.read(path).stretch, STRETCH, rtol=1e-5)
 
 
 def test_strains_across_the_test_and_its_limits_are_not_asked_about(tmp_path):
     columns = {"Crosshead (mm)": LENGTH * STRAIN, "Load (N)": STRESS * AREA, "Lateral strain (%)": -40 * STRAIN}
-    path = written(tmp_path / "test.csv", **columns)
+    path = by_name(tmp_path, **columns)
     np.testing.assert_allclose(tq.read(path, **SIZES).stretch, STRETCH, rtol=1e-5)
 
 
@@ -70,11 +64,8 @@ def test_strains_across_the_test_and_its_limits_are_not_asked_about(tmp_path):
     "names", [("Time", "Extension 1", "Load 1"), ("Elapsed Time", "Scan 2 Displacement", "Load 1")]
 )
 def test_tabs_part_names_with_numbers_over_a_row_of_units(tmp_path, names):
-    path = written(
-        tmp_path / "test.txt", "\t", **dict(zip(names, (STRAIN, LENGTH * STRAIN, STRESS * AREA), strict=True))
-    )
-    lines = path.read_text().splitlines()
-    path.write_text("\n".join([lines[0], "s\tmm\tN", *lines[1:]]) + "\n")
+    head = "\t".join(names) + "\ns\tmm\tN"
+    path = written(tmp_path, head, STRAIN, LENGTH * STRAIN, STRESS * AREA, separator="\t", name="test.txt")
     experiment = tq.read(path, columns={"displacement": names[1], "force": names[2]}, **SIZES)
     np.testing.assert_allclose(experiment.stretch, STRETCH, rtol=1e-5)
     np.testing.assert_allclose(experiment.stress, STRESS, rtol=1e-5, atol=1e-9)
@@ -88,7 +79,7 @@ def test_of_a_load_and_an_extension_with_and_without_correction_the_corrected_on
         "Load (N)": force + 0.1,
         "Compliance corrected load (N)": force,
     }
-    path = written(tmp_path / "test.csv", **columns)
+    path = by_name(tmp_path, **columns)
     with pytest.warns(UserWarning, match=r"'Corrected extension \(mm\)' is read, and not 'Extension \(mm\)' beside it"):
         data = tq.read(path, dimensions=SIZES)
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-6)
@@ -99,6 +90,6 @@ def test_of_a_load_and_an_extension_with_and_without_correction_the_corrected_on
 
 
 def test_a_corrected_column_alone_is_read_without_a_word(tmp_path, recwarn):
-    path = written(tmp_path / "test.csv", **{"Corrected extension (mm)": STRAIN * LENGTH, "Load (N)": STRESS * AREA})
+    path = by_name(tmp_path, **{"Corrected extension (mm)": STRAIN * LENGTH, "Load (N)": STRESS * AREA})
     np.testing.assert_allclose(tq.read(path, dimensions=SIZES).stretch, STRETCH, rtol=1e-6)
     assert not list(recwarn)

@@ -13,6 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.headings import measure_in
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.read import read_experiment
+from written_files import by_name, message, written
 
 MU = 0.04  # MPa
 STRETCH = np.array([0.8, 0.9, 1.0, 1.2, 1.5])
@@ -43,13 +44,6 @@ SHEARED = [np.array([[1, shear, 0], [0, 1, 0], [0, 0, 1]]) for shear in SHEAR]
 P11 = [stresses["engineering"][0, 0] for _, stresses in tensors(UNIAXIAL)]
 
 
-def written(folder, **columns):
-    file = folder / "test.csv"
-    rows = zip(*columns.values(), strict=True)
-    file.write_text("\n".join([",".join(columns), *(",".join(f"{value:.12g}" for value in row) for row in rows)]))
-    return file
-
-
 def components(gradients, strain, stress, place):
     pairs = [(strains[strain][place], stresses[stress][place]) for strains, stresses in tensors(gradients)]
     return np.array(pairs).T
@@ -59,7 +53,7 @@ def components(gradients, strain, stress, place):
 @pytest.mark.parametrize("strain", [name for name, measure in STRAIN_MEASURES.items() if measure.stretch])
 def test_every_measure_gives_the_stretch_and_engineering_stress_of_its_tensor(tmp_path, strain, stress):
     values = components(UNIAXIAL, strain, stress, (0, 0))
-    file = written(tmp_path, strain=100 * values[0], stress=1000 * values[1])
+    file = by_name(tmp_path, strain=100 * values[0], stress=1000 * values[1])
     units = {"strain_unit": "%", "stress_unit": "kPa"}
     data = read_experiment(file, strain_type=strain, stress_type=stress, **units)
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
@@ -72,7 +66,7 @@ def test_stresses_of_two_axes_are_converted_along_each(tmp_path, stress):
     columns = {}
     for axis, place in (("x", (0, 0)), ("y", (1, 1))):
         columns[f"Green strain {axis}"], columns[f"stress {axis} [MPa]"] = components(gradients, "green", stress, place)
-    data = read_experiment(written(tmp_path, **columns), mode="biaxial", stress_type=stress)
+    data = read_experiment(by_name(tmp_path, **columns), mode="biaxial", stress_type=stress)
     expected = [[stresses["engineering"][axis, axis] for axis in (0, 1)] for _, stresses in tensors(gradients)]
     np.testing.assert_allclose(data.stress, expected, atol=1e-9)
     np.testing.assert_allclose(data.stretch, [np.diag(F)[:2] for F in gradients], rtol=1e-9)
@@ -82,7 +76,7 @@ def test_stresses_of_two_axes_are_converted_along_each(tmp_path, stress):
 @pytest.mark.parametrize("stress", ["engineering", "cauchy"])
 def test_components_of_shear_give_the_amount_of_shear_and_its_stress(tmp_path, strain, stress):
     values = components(SHEARED, strain, stress, (0, 1))
-    file = written(tmp_path, shear=values[0], stress=values[1])
+    file = by_name(tmp_path, shear=values[0], stress=values[1])
     data = read_experiment(file, mode="simple-shear", strain_type=strain, stress_type=stress, stress_unit="MPa")
     np.testing.assert_allclose(data.stretch, SHEAR, atol=1e-9)
     np.testing.assert_allclose(data.stress, MU * SHEAR, atol=1e-9)
@@ -93,12 +87,12 @@ def test_components_of_shear_give_the_amount_of_shear_and_its_stress(tmp_path, s
 )
 def test_an_angle_of_shear_is_recognised_with_its_unit(tmp_path, name):
     factor = 1000 if "mrad" in name else 1 if "rad" in name else 180 / np.pi
-    file = written(tmp_path, **{name: factor * np.arctan(SHEAR), "stress [MPa]": MU * SHEAR})
+    file = by_name(tmp_path, **{name: factor * np.arctan(SHEAR), "stress [MPa]": MU * SHEAR})
     np.testing.assert_allclose(read_experiment(file, mode="simple-shear").stretch, SHEAR, atol=1e-9)
 
 
 def test_an_angle_without_a_unit_is_asked_about(tmp_path):
-    file = written(tmp_path, **{"shear angle": np.degrees(np.arctan(SHEAR)), "stress [MPa]": MU * SHEAR})
+    file = by_name(tmp_path, **{"shear angle": np.degrees(np.arctan(SHEAR)), "stress [MPa]": MU * SHEAR})
     with pytest.raises(InputError, match=r"states no unit of angle; give strain_unit \(--strain-unit rad\)"):
         read_experiment(file, mode="simple-shear")
     data = read_experiment(file, mode="simple-shear", strain_unit="deg")
@@ -108,7 +102,7 @@ def test_an_angle_without_a_unit_is_asked_about(tmp_path):
 def test_one_component_of_the_second_stress_does_not_tell_the_shear_stress_but_two_do(tmp_path):
     shear, normal = ([strains[place] for strains in (s["second-piola-kirchhoff"] for _, s in tensors(SHEARED))]
                      for place in ((0, 1), (1, 1)))  # fmt: skip
-    file = written(tmp_path, shear=SHEAR, s12=shear, s22=normal)
+    file = by_name(tmp_path, shear=SHEAR, s12=shear, s22=normal)
     given = {"stress_type": "second-piola-kirchhoff", "stress_unit": "MPa"}
     with pytest.raises(InputError, match=r"P12 = S12 \+ g S22"):
         read_experiment(file, mode="simple-shear", columns={"stress": "s12"}, **given)
@@ -120,7 +114,7 @@ def test_one_component_of_the_second_stress_does_not_tell_the_shear_stress_but_t
 def test_positive_compression_changes_the_sign_of_the_strain_that_is_in_the_file(tmp_path):
     stretch = np.array([1.0, 0.9, 0.7])
     stress = MU * (stretch - stretch**-2)
-    file = written(tmp_path, **{"True strain": -np.log(stretch), "Engineering stress [MPa]": -stress})
+    file = by_name(tmp_path, **{"True strain": -np.log(stretch), "Engineering stress [MPa]": -stress})
     data = read_experiment(file, compression_positive=True)
     np.testing.assert_allclose(data.stretch, stretch, rtol=1e-9)
     np.testing.assert_allclose(data.stress, stress, rtol=1e-9)
@@ -131,7 +125,7 @@ def test_a_preload_does_not_change_the_area_that_the_second_stress_is_over(tmp_p
     force_over_area = np.maximum(0.0, stretch - 1.1)
     given = {"preload": "0.05 MPa"}
     by_force, by_second = (
-        read_experiment(written(tmp_path, **{"stretch": stretch, name: stress}), **given)
+        read_experiment(by_name(tmp_path, **{"stretch": stretch, name: stress}), **given)
         for name, stress in (("stress [MPa]", force_over_area), ("PK2 [MPa]", force_over_area / stretch))
     )
     shared = min(len(by_force), len(by_second))
@@ -212,7 +206,7 @@ def test_words_for_measures_are_known_in_several_languages(quantity, meaning):
 )
 def test_names_that_say_the_measure_need_no_option(tmp_path, strain, stress, expected):
     values = components(UNIAXIAL, *expected, (0, 0))
-    file = written(tmp_path, **{strain: 100 * values[0], stress: values[1]})
+    file = by_name(tmp_path, **{strain: 100 * values[0], stress: values[1]})
     data = read_experiment(file)
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
     np.testing.assert_allclose(data.stress, P11, atol=1e-9)
@@ -220,13 +214,13 @@ def test_names_that_say_the_measure_need_no_option(tmp_path, strain, stress, exp
 
 @pytest.mark.parametrize("name", ["F11", "F_11 [-]", "Fxx", "lambda11", "λ_11"])
 def test_a_diagonal_component_of_the_deformation_gradient_is_a_stretch(tmp_path, name):
-    data = read_experiment(written(tmp_path, **{name: STRETCH, "P11 [MPa]": P11}))
+    data = read_experiment(by_name(tmp_path, **{name: STRETCH, "P11 [MPa]": P11}))
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
     np.testing.assert_allclose(data.stress, P11, atol=1e-12)
 
 
 def test_what_is_called_like_a_component_but_has_a_unit_of_force_is_a_force(tmp_path):
-    file = written(tmp_path, **{"stretch": STRETCH, "Fxx (N)": 10 * np.array(P11)})
+    file = by_name(tmp_path, **{"stretch": STRETCH, "Fxx (N)": 10 * np.array(P11)})
     data = read_experiment(file, dimensions={"area": "10 mm2"})
     np.testing.assert_allclose(data.stress, P11, atol=1e-9)
 
@@ -234,7 +228,7 @@ def test_what_is_called_like_a_component_but_has_a_unit_of_force_is_a_force(tmp_
 def test_components_of_both_axes_are_a_biaxial_test(tmp_path):
     points = np.column_stack([STRETCH, np.sqrt(STRETCH)])
     names = ("F11", "F22", "Cauchy stress T11 [MPa]", "Cauchy stress T22 [MPa]")
-    file = written(tmp_path, **dict(zip(names, (*points.T, *(points**2 - 1).T), strict=True)))
+    file = by_name(tmp_path, **dict(zip(names, (*points.T, *(points**2 - 1).T), strict=True)))
     data = read_experiment(file, mode="biaxial")
     np.testing.assert_allclose(data.stretch, points, rtol=1e-9)
     np.testing.assert_allclose(data.stress, points - 1 / points, atol=1e-9)
@@ -243,7 +237,7 @@ def test_components_of_both_axes_are_a_biaxial_test(tmp_path):
 def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
     columns = {"Strain": STRETCH - 1, "Stress [MPa]": np.array(P11), "True strain": np.log(STRETCH)}
     columns["True stress [MPa]"] = columns["Stress [MPa]"] * STRETCH
-    file = written(tmp_path, **columns)
+    file = by_name(tmp_path, **columns)
     for strain_type, stress_type in product((None, "true"), (None, "cauchy")):
         data = read_experiment(file, strain_type=strain_type, stress_type=stress_type)
         np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
@@ -286,23 +280,18 @@ def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
 )
 def test_what_names_leave_open_or_contradict_is_refused_with_what_settles_it(tmp_path, names, options, words):
     columns = [STRETCH - 1 if "stretch" not in names else STRETCH, P11, 5 + STRETCH]
-    file = tmp_path / "test.csv"
-    rows = [",".join(map(str, row[: 1 + names.count(",")])) for row in zip(*columns, strict=True)]
-    file.write_text("\n".join([names, *rows]))
-    with pytest.raises(InputError) as refusal:
-        read_experiment(file, **options)
-    assert words in str(refusal.value)
+    assert words in message(written(tmp_path, names, *columns[: 1 + names.count(",")]), **options)
 
 
 def test_strains_beyond_what_a_measure_can_be_are_refused(tmp_path):
-    file = written(tmp_path, **{"Green strain": [-0.6, 0.0, 0.2], "engineering stress [MPa]": [-0.2, 0.0, 0.1]})
+    file = by_name(tmp_path, **{"Green strain": [-0.6, 0.0, 0.2], "engineering stress [MPa]": [-0.2, 0.0, 0.1]})
     with pytest.raises(InputError, match=r"-0\.6 is no strain of type 'green', which is larger than -0\.5"):
         read_experiment(file)
 
 
 def test_inspect_says_the_measures_and_how_they_are_converted(tmp_path):
     values = components(UNIAXIAL, "true", "cauchy", (0, 0))
-    text = str(tq.inspect(written(tmp_path, **{"True strain [%]": 100 * values[0], "True stress [MPa]": values[1]})))
+    text = str(tq.inspect(by_name(tmp_path, **{"True strain [%]": 100 * values[0], "True stress [MPa]": values[1]})))
     assert "'True strain [%]' is true strain, 'True stress [MPa]' is cauchy stress" in text
     assert "stretch = exp(column 'True strain [%]' x 0.01)" in text
     assert "Cauchy stress divided by stretch to engineering stress" in text
@@ -337,7 +326,7 @@ def test_no_other_measure_is_read_as_the_engineering_one_without_a_word(tmp_path
     values = components(UNIAXIAL, *measures, (0, 0))
     factor = 100 if "%" in strain else 1
     try:
-        data = read_experiment(written(tmp_path, **{strain: factor * values[0], stress: values[1]}))
+        data = read_experiment(by_name(tmp_path, **{strain: factor * values[0], stress: values[1]}))
     except InputError:
         return
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)

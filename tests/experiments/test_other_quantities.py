@@ -12,15 +12,10 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
+from written_files import written
 
 L = ramp()
 P = 1e3 * neo_hookean(L)  # kPa
-
-
-def written(folder, head, *columns):
-    rows = [",".join(f"{value:.8g}" for value in row) for row in zip(*columns, strict=True)]
-    (folder / "test.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
-    return folder / "test.csv"
 
 
 def proposed(message):

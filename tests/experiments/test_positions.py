@@ -5,20 +5,18 @@ import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_file
+from written_files import written
 
 LENGTH, AREA = 20.0, 10.0
 SPECIMEN = {"length": "20 mm", "area": "10 mm2"}
 
 
-def written(folder, stretch, start, name="Displacement (mm)", unit=1.0, sign=1.0, noise=0.0, load="Load (N)", seed=0):
+def positions(folder, stretch, start, name="Displacement (mm)", unit=1.0, sign=1.0, noise=0.0, load="Load (N)", seed=0):
     """A test whose column of displacements begins at a position (mm)."""
     force = AREA * neo_hookean(stretch)
     force = force + noise * np.abs(force).max() * np.random.default_rng(seed).standard_normal(len(force))
     position = (start + LENGTH * (stretch - 1)) / unit
-    path = folder / "test.csv"
-    rows = "".join(f"{p:.6f},{sign * f:.7f}\n" for p, f in zip(position, force, strict=True))
-    path.write_text(f"{name},{load}\n{rows}")
-    return path
+    return written(folder, f"{name},{load}", position, sign * force)
 
 
 def ramp(top, rows=60, unloads=False):
@@ -32,7 +30,7 @@ def ramp(top, rows=60, unloads=False):
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_positions_are_counted_from_their_first_row_with_a_note(tmp_path, name, start, top, noise):
     stretch = ramp(top, unloads=start > 0)
-    inspection = tq.inspect(written(tmp_path, stretch, start, name, noise=noise), dimensions=SPECIMEN)
+    inspection = tq.inspect(positions(tmp_path, stretch, start, name, noise=noise), dimensions=SPECIMEN)
     np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
     assert any("does not begin at 0, and the load there is small" in note for note in inspection.warnings)
 
@@ -42,14 +40,14 @@ def test_positions_are_counted_from_their_first_row_with_a_note(tmp_path, name, 
 @pytest.mark.parametrize("noise", [0.0, 0.002])
 def test_a_small_offset_shows_by_a_load_that_begins_there(tmp_path, start, top, noise):
     stretch = ramp(top, rows=200)
-    inspection = tq.inspect(written(tmp_path, stretch, start, noise=noise), dimensions=SPECIMEN)
+    inspection = tq.inspect(positions(tmp_path, stretch, start, noise=noise), dimensions=SPECIMEN)
     np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
     assert any("does not begin at 0" in note for note in inspection.warnings)
 
 
 @pytest.mark.parametrize("zero", ["first", "35.2 mm", "3.52 cm"])
 def test_the_zero_is_said_and_then_raises_no_note(tmp_path, zero):
-    path = written(tmp_path, ramp(1.3), 35.2)
+    path = positions(tmp_path, ramp(1.3), 35.2)
     inspection = tq.inspect(path, dimensions=SPECIMEN, zero=zero)
     np.testing.assert_allclose(inspection.reading.experiment.stretch, ramp(1.3), atol=1e-6)
     assert not inspection.warnings
@@ -57,13 +55,13 @@ def test_the_zero_is_said_and_then_raises_no_note(tmp_path, zero):
 
 
 def test_displacements_of_a_specimen_stretched_before_are_read_so_when_said(tmp_path):
-    data = tq.read_experiment(written(tmp_path, ramp(1.3), 2.0), dimensions=SPECIMEN, zero="0 mm")
+    data = tq.read_experiment(positions(tmp_path, ramp(1.3), 2.0), dimensions=SPECIMEN, zero="0 mm")
     np.testing.assert_allclose(data.stretch, ramp(1.3) + 0.1, atol=1e-6)
 
 
 def test_a_start_away_from_0_under_load_is_asked_about_with_every_answer(tmp_path):
     stretch = ramp(1.3)[20:]
-    path = written(tmp_path, stretch, 35.2 - 3)
+    path = positions(tmp_path, stretch, 35.2 - 3)
     with pytest.raises(InputError) as caught:
         tq.read_experiment(path, dimensions=SPECIMEN)
     text = str(caught.value)
@@ -93,7 +91,7 @@ def test_displacements_are_read_as_before(tmp_path, kind, noise, seed):
         "taut at once": ramp(1.5)[1:],
         "cut": ramp(1.3, rows=200)[8:],
     }[kind]
-    inspection = tq.inspect(written(tmp_path, stretch, 0.0, noise=noise, seed=seed), dimensions=SPECIMEN)
+    inspection = tq.inspect(positions(tmp_path, stretch, 0.0, noise=noise, seed=seed), dimensions=SPECIMEN)
     np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
     assert not any("begin at 0" in note for note in inspection.warnings)
 
@@ -102,11 +100,7 @@ def test_displacements_are_read_as_before(tmp_path, kind, noise, seed):
 @pytest.mark.parametrize("start", [10.2, 20.0])
 def test_heights_are_read_over_that_of_the_first_row(tmp_path, name, unit, start):
     height = np.linspace(start, start / 2, 60)
-    path = tmp_path / "test.csv"
-    force = -AREA * neo_hookean(height / start)
-    path.write_text(
-        f"{name},Normal force (N)\n" + "".join(f"{h / unit:.5f},{f:.7f}\n" for h, f in zip(height, force, strict=True))
-    )
+    path = written(tmp_path, f"{name},Normal force (N)", height / unit, -AREA * neo_hookean(height / start))
     with pytest.raises(InputError, match="--compression-positive"):
         tq.read_experiment(path, dimensions={"area": "10 mm2"})
     data = tq.read_experiment(path, dimensions={"area": "10 mm2"}, compression_positive=True)
@@ -122,14 +116,12 @@ def test_heights_are_read_over_that_of_the_first_row(tmp_path, name, unit, start
 
 
 def test_a_distance_of_grips_is_a_length_and_where_it_stays_a_size(tmp_path):
-    stretch, path = ramp(1.3), tmp_path / "test.csv"
-    force = AREA * neo_hookean(stretch)
-    rows = [f"{50 * x:.6f},{f:.8f},50\n" for x, f in zip(stretch, force, strict=True)]
-    path.write_text(f"Grip separation (mm),Force (N),Gauge length (mm)\n{''.join(rows)}")
+    stretch = ramp(1.3)
+    force, grips = AREA * neo_hookean(stretch), 0 * stretch + 50
+    path = written(tmp_path, "Grip separation (mm),Force (N),Gauge length (mm)", 50 * stretch, force, grips)
     data = tq.read_experiment(path, dimensions={"area": "10 mm2"})
     np.testing.assert_allclose(data.stretch, stretch, atol=1e-6)
-    rows = [f"{50 * (x - 1):.6f},{f:.8f},50\n" for x, f in zip(stretch, force, strict=True)]
-    path.write_text(f"Extension (mm),Force (N),Grip separation (mm)\n{''.join(rows)}")
+    path = written(tmp_path, "Extension (mm),Force (N),Grip separation (mm)", 50 * (stretch - 1), force, grips)
     data = tq.read_experiment(path, dimensions={"area": "10 mm2"})
     np.testing.assert_allclose(data.stretch, stretch, atol=1e-6)
 
@@ -155,16 +147,14 @@ def test_what_cannot_be_a_height_is_refused(tmp_path, rows, words):
 )
 def test_a_zero_that_cannot_be_meant_is_refused(tmp_path, options, words):
     with pytest.raises(InputError, match=words):
-        tq.read_experiment(written(tmp_path, ramp(1.3), 35.2), dimensions=SPECIMEN, **options)
+        tq.read_experiment(positions(tmp_path, ramp(1.3), 35.2), dimensions=SPECIMEN, **options)
 
 
 def compliant(tmp_path, compliance, sign=1):
     """A specimen of 20 mm whose grips move further than it by 0.05 mm for every N, 10 N at 4 mm."""
     true = np.linspace(0, 4, 41)
     force = 2.5 * true
-    path = tmp_path / "test.csv"
-    rows = "".join(f"{1000 * (d + 0.05 * f):.4f},{sign * f / 1000:.7f}\n" for d, f in zip(true, force, strict=True))
-    path.write_text("Displacement (um),Load (kN)\n" + rows)
+    path = written(tmp_path, "Displacement (um),Load (kN)", 1000 * (true + 0.05 * force), sign * force / 1000)
     return true, read_file(path, dimensions={"length": "20 mm", "area": "10 mm2"}, compliance=compliance)
 
 
@@ -183,9 +173,7 @@ def test_a_compliance_that_is_none_is_refused(tmp_path, compliance):
 
 def test_a_machine_gives_way_in_the_direction_of_its_force_whatever_the_signs(tmp_path):
     true = np.linspace(0, 4, 41)
-    path = tmp_path / "test.csv"
-    rows = "".join(f"{d + 0.05 * f:.5f},{-f:.5f}\n" for d, f in zip(true, 2.5 * true, strict=True))
-    path.write_text("Displacement (mm),Load (N)\n" + rows)
+    path = written(tmp_path, "Displacement (mm),Load (N)", true + 0.05 * 2.5 * true, -2.5 * true)
     options = {"dimensions": {"length": "20 mm", "area": "10 mm2"}, "compression_positive": True}
     data = read_file(path, compliance="0.05 mm/N", **options).experiment
     np.testing.assert_allclose(data.stretch, 1 - true / 20, rtol=1e-5)

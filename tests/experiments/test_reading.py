@@ -8,6 +8,7 @@ from marks import slow_but
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.read import read_experiment
+from written_files import message
 
 pytestmark = pytest.mark.filterwarnings("ignore:check the unit:UserWarning")  # many headings here state no unit
 
@@ -104,12 +105,6 @@ def written(tmp_path):
         return path
 
     return write
-
-
-def message(path, **options):
-    with pytest.raises(InputError) as caught:
-        read_experiment(path, **options)
-    return str(caught.value)
 
 
 @pytest.mark.parametrize("name", sorted(GOOD))

@@ -10,6 +10,7 @@ from planted import CLEAN, LAWS, PLANTED, STIFFENING, rates
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
 from tissuq.experiments.reading.disturbances import find_drift, find_outliers, find_saturation, staircase_of, step_of
+from written_files import written
 
 ALL_LAWS = [*LAWS, *STIFFENING]
 WAY = np.linspace(0, 1, 121)
@@ -18,9 +19,7 @@ WAY = np.linspace(0, 1, 121)
 @pytest.fixture
 def inspected(tmp_path):
     def inspect(stretch, stress, **options):
-        path = tmp_path / "test.csv"
-        rows = "".join(f"{a:.6f},{b:.6f}\n" for a, b in zip(stretch, stress, strict=True))
-        path.write_text("stretch,stress [kPa]\n" + rows)
+        path = written(tmp_path, "stretch,stress [kPa]", stretch, stress, form="{:.6f}".format)
         return tq.inspect(path, **options)
 
     return inspect
@@ -44,7 +43,7 @@ def test_clean_tests_raise_no_more_than_5_of_100_false_alarms_of_all_kinds_toget
 @pytest.mark.parametrize("name", datasets.names())
 def test_the_data_sets_show_none_but_few_digits(name):
     reading = tq.inspect(datasets.path(name), mode=datasets.load(name).mode).reading
-    assert {region.kind for regions in reading.regions for region in regions} <= {"resolution"}
+    assert {region.kind for tested in reading.tested for region in tested.regions} <= {"resolution"}
 
 
 def test_a_slip_is_said_with_its_lines_and_the_advice_keeps_what_came_before(inspected):
@@ -74,7 +73,7 @@ def test_noise_beside_a_saturated_load_cell_is_no_slip(inspected):
     curve = (stretch - stretch**-2) * (1 + (stretch**2 + 2 / stretch - 3))
     for _ in range(40):
         load = np.minimum(curve / curve.max() + noise.normal(0, 0.005, 365), 0.75)
-        regions = inspected(stretch, load).reading.regions[0]
+        regions = inspected(stretch, load).reading.tested[0].regions
         assert {region.kind for region in regions} == {"saturation"}
 
 
@@ -210,7 +209,7 @@ def test_a_fall_on_the_way_from_compression_to_the_reference_is_no_slip(inspecte
     """The size of the stress falls there in any case, more steeply in places."""
     strain = np.linspace(-0.15, 0.15, 101)
     stress = np.where(strain < 0, 3.0, 1.0) * strain - 0.03 * (strain < -0.08)
-    assert inspected(1 + strain, stress).reading.regions == [[]]
+    assert inspected(1 + strain, stress).reading.tested[0].regions == []
 
 
 def test_two_loads_alone_are_no_saturation():

@@ -8,6 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
+from written_files import written
 
 LENGTH, AREA = 20.0, 300.0
 BOTH_WAYS = np.concatenate([np.linspace(1, 1.15, 30), np.linspace(1.15, 0.85, 60)])
@@ -16,9 +17,7 @@ SIZES = {"length": "20 mm", "area": "300 mm2"}
 
 
 def read(folder, name, deformation, force, **options):
-    path = folder / "test.csv"
-    rows = "".join(f"{d:.9f},{f:.9f}\n" for d, f in zip(deformation, force, strict=True))
-    path.write_text(f"{name},Normal Force (N)\n{rows}")
+    path = written(folder, f"{name},Normal Force (N)", deformation, force)
     dimensions = {"area": SIZES["area"]} if name.startswith("Gap") else SIZES
     return tq.read_experiment(path, dimensions=dimensions, **options)
 
@@ -73,8 +72,7 @@ def test_signs_are_turned_as_asked(tmp_path, turn, sign, sign_of_load, stretch):
 def test_the_message_on_tension_with_negative_loads_names_the_option_that_reads_it(tmp_path, name):
     stress = neo_hookean(TENSION)
     deformation = TENSION if name == "Stretch" else LENGTH * (TENSION - 1)
-    path = tmp_path / "test.csv"
-    path.write_text("\n".join([f"{name},Force (N)", *map("{:.9f},{:.9f}".format, deformation, -AREA * stress)]))
+    path = written(tmp_path, f"{name},Force (N)", deformation, -AREA * stress)
     sizes = {"area": "300 mm2"} if name == "Stretch" else SIZES
     with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
         tq.read(path, dimensions=sizes)
@@ -83,8 +81,7 @@ def test_the_message_on_tension_with_negative_loads_names_the_option_that_reads_
 
 def test_shear_of_the_other_sign_is_turned(tmp_path):
     shear = np.linspace(0, 0.4, 30)
-    path = tmp_path / "test.csv"
-    path.write_text("\n".join(["Shear,Stress (kPa)", *map("{:.9f},{:.9f}".format, shear, -40 * shear)]))
+    path = written(tmp_path, "Shear,Stress (kPa)", shear, -40 * shear)
     with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
         tq.read(path, mode="simple-shear")
     for turn, sign in (("load", 1), ("deformation", -1)):
@@ -96,9 +93,7 @@ def test_shear_of_the_other_sign_is_turned(tmp_path):
 def test_both_loads_of_a_sheet_are_turned(tmp_path):
     stress = 0.04 * (TENSION - TENSION**-5)
     columns = [TENSION, -1e3 * stress, TENSION, -1e3 * stress]
-    path = tmp_path / "test.csv"
-    rows = [",".join(map("{:.9f}".format, row)) for row in zip(*columns, strict=True)]
-    path.write_text("\n".join(["stretch x,stress x (kPa),stretch y,stress y (kPa)", *rows]))
+    path = written(tmp_path, "stretch x,stress x (kPa),stretch y,stress y (kPa)", *columns)
     with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
         tq.read(path)
     np.testing.assert_allclose(tq.read(path, turn="load").stress, np.column_stack([stress, stress]), atol=1e-9)
@@ -111,9 +106,7 @@ def test_both_loads_of_a_sheet_are_turned(tmp_path):
 
 def test_positions_whose_load_does_not_begin_at_zero_are_read_by_the_zero_of_the_load(tmp_path):
     stress = neo_hookean(TENSION)
-    path = tmp_path / "test.csv"
-    columns = 35 + LENGTH * (TENSION - 1), AREA * (stress + 0.01)
-    path.write_text("\n".join(["Position (mm),Force (N)", *map("{:.9f},{:.9f}".format, *columns)]))
+    path = written(tmp_path, "Position (mm),Force (N)", 35 + LENGTH * (TENSION - 1), AREA * (stress + 0.01))
     with pytest.raises(InputError, match="--load-zero first"):
         tq.read(path, dimensions=SIZES)
     data = tq.read(path, dimensions=SIZES, load_zero="first")
@@ -122,9 +115,8 @@ def test_positions_whose_load_does_not_begin_at_zero_are_read_by_the_zero_of_the
 
 
 def test_negative_numbers_of_a_test_that_is_called_tension_are_asked_about(tmp_path):
-    path = tmp_path / "tension.csv"
     columns = -LENGTH * (TENSION - 1), -AREA * neo_hookean(TENSION)
-    path.write_text("\n".join(["Displacement (mm),Force (N)", *map("{:.9f},{:.9f}".format, *columns)]))
+    path = written(tmp_path, "Displacement (mm),Force (N)", *columns, name="tension.csv")
     with pytest.raises(InputError, match=r"turn='both' \(--turn both\).*--tension-positive"):
         tq.read(path, dimensions=SIZES)
     np.testing.assert_allclose(tq.read(path, dimensions=SIZES, turn="both").stretch, TENSION, atol=1e-8)
@@ -177,9 +169,8 @@ def test_what_cannot_be_turned_and_a_turn_that_is_wrong_are_refused(tmp_path):
 )
 def test_what_a_load_cell_reads_without_load_is_taken_off(tmp_path, load_zero, unit, scale):
     stress = neo_hookean(TENSION)
-    path = tmp_path / "test.csv"
     columns = LENGTH * (TENSION - 1), scale * (AREA * stress + 0.5)
-    path.write_text("\n".join([f"Displacement (mm),Force ({unit})", *map("{:.9f},{:.9f}".format, *columns)]))
+    path = written(tmp_path, f"Displacement (mm),Force ({unit})", *columns)
     data = tq.read(path, dimensions=SIZES, load_zero=load_zero)
     np.testing.assert_allclose(data.stress, stress, atol=1e-8)
     assert "counted from" in data.source
@@ -187,8 +178,7 @@ def test_what_a_load_cell_reads_without_load_is_taken_off(tmp_path, load_zero, u
 
 def test_the_zero_of_stresses_is_taken_off_and_inspect_proposes_it(tmp_path):
     stress = neo_hookean(TENSION)
-    path = tmp_path / "test.csv"
-    path.write_text("\n".join(["Stretch,Stress (kPa)", *map("{:.9f},{:.9f}".format, TENSION, 1e3 * stress + 6)]))
+    path = written(tmp_path, "Stretch,Stress (kPa)", TENSION, 1e3 * stress + 6)
     assert "--load-zero first takes off" in " ".join(str(tq.inspect(path)).split())
     for load_zero in ("first", "6 kPa", "0.006 MPa"):
         np.testing.assert_allclose(tq.read(path, load_zero=load_zero).stress, stress, atol=1e-9)
@@ -209,10 +199,8 @@ def test_the_zero_of_stresses_is_taken_off_and_inspect_proposes_it(tmp_path):
     ],
 )
 def test_compression_that_is_written_positive_is_asked_about_wherever_the_file_says_it(tmp_path, above, names):
-    path = tmp_path / "test.csv"
     stretch = np.linspace(1, 0.7, 40)
-    rows = "".join(f"{100 * (1 - x):.9f},{-1e3 * neo_hookean(x):.9f}\n" for x in stretch)
-    path.write_text(f"{above}{names}\n{rows}")
+    path = written(tmp_path, f"{above}{names}", 100 * (1 - stretch), -1e3 * neo_hookean(stretch))
     with pytest.raises(InputError, match=r"compression.*--compression-positive"):
         tq.read(path)
     data = tq.read(path, compression_positive=True)
@@ -222,7 +210,5 @@ def test_compression_that_is_written_positive_is_asked_about_wherever_the_file_s
 
 @pytest.mark.parametrize("above", ["", "Frame: tension and compression\n", "Extension rate: 1 mm/min\n"])
 def test_where_nothing_says_compression_positive_strains_are_those_of_tension(tmp_path, above):
-    path = tmp_path / "test.csv"
-    rows = "".join(f"{x - 1:.9f},{1e3 * neo_hookean(x):.9f}\n" for x in TENSION)
-    path.write_text(f"{above}Strain,Stress [kPa]\n{rows}")
+    path = written(tmp_path, f"{above}Strain,Stress [kPa]", TENSION - 1, 1e3 * neo_hookean(TENSION))
     np.testing.assert_allclose(tq.read(path).stretch, TENSION, atol=1e-9)

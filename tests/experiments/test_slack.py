@@ -10,6 +10,7 @@ from tissuq.experiments import datasets
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.slack import find_slack
+from written_files import written
 
 LENGTH, SLACK, STIFFNESS = 20.0, 1.5, 0.4
 SPECIMEN = {"length": "20 mm", "area": "2 mm2"}
@@ -21,10 +22,7 @@ def hanging(tmp_path):
     up = np.linspace(0, 4, 41)
     displacement = np.concatenate([up, up[-2::-1]])
     force = np.maximum(displacement - SLACK, 0) * STIFFNESS
-    path = tmp_path / "test.csv"
-    rows = "".join(f"{d:.6f},{f:.6f}\n" for d, f in zip(displacement, force, strict=True))
-    path.write_text("Disp (mm),Load (N)\n" + rows)
-    return path
+    return written(tmp_path, "Disp (mm),Load (N)", displacement, force)
 
 
 @pytest.mark.parametrize("preload", ["0.1 N", "100 mN", "50 kPa", "0,05 MPa"])

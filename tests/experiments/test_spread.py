@@ -10,18 +10,12 @@ import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments.reading.headings import of_spread
 from tissuq.experiments.reading.read import read_experiment
+from written_files import by_name
 
 STRETCH = np.linspace(1.0, 1.3, 7)
 STRESS = 100 * (STRETCH - STRETCH**-2)  # kPa
 SPREAD = 0.1 * STRESS + 0.2
 OF_SIX = t.ppf(0.975, 5) / 1.959963984540054
-
-
-def written(folder, **columns):
-    file = folder / "test.csv"
-    rows = zip(*columns.values(), strict=True)
-    file.write_text("\n".join([",".join(columns), *(",".join(f"{value:.12g}" for value in row) for row in rows)]))
-    return file
 
 
 @pytest.mark.parametrize(
@@ -42,20 +36,20 @@ def written(folder, **columns):
     ],
 )
 def test_the_spread_of_a_mean_becomes_its_standard_error(tmp_path, names, options, error):
-    data = read_experiment(written(tmp_path, **dict(zip(names, (STRETCH, STRESS, SPREAD), strict=True))), **options)
+    data = read_experiment(by_name(tmp_path, **dict(zip(names, (STRETCH, STRESS, SPREAD), strict=True))), **options)
     np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(data.standard_error, error, rtol=1e-9)
 
 
 def test_the_number_of_specimens_may_stand_in_a_column(tmp_path):
     counts = np.array([6, 6, 6, 6, 5, 5, 4])
-    file = written(tmp_path, Stretch=STRETCH, **{"Stress (kPa)": STRESS, "SD (kPa)": SPREAD}, n=counts)
+    file = by_name(tmp_path, Stretch=STRETCH, **{"Stress (kPa)": STRESS, "SD (kPa)": SPREAD}, n=counts)
     expected = SPREAD * 1e-3 * t.ppf(0.975, counts - 1) / 1.959963984540054 / np.sqrt(counts)
     np.testing.assert_allclose(read_experiment(file).standard_error, expected, rtol=1e-9)
 
 
 def test_numbers_of_rows_are_no_numbers_of_specimens(tmp_path):
-    file = written(tmp_path, n=np.arange(2, 9), Stretch=STRETCH, **{"Stress (kPa)": STRESS, "SD (kPa)": SPREAD})
+    file = by_name(tmp_path, n=np.arange(2, 9), Stretch=STRETCH, **{"Stress (kPa)": STRESS, "SD (kPa)": SPREAD})
     assert not read_experiment(file).standard_error.any()
 
 
@@ -66,10 +60,10 @@ def test_the_spread_of_the_strain_is_not_that_of_the_stress(tmp_path):
         "Stress (kPa)": STRESS,
         "Stress SEM (kPa)": SPREAD,
     }
-    data = read_experiment(written(tmp_path, **columns))
+    data = read_experiment(by_name(tmp_path, **columns))
     np.testing.assert_allclose(data.standard_error, SPREAD * 1e-3, rtol=1e-9)
     del columns["Stress SEM (kPa)"]
-    assert not read_experiment(written(tmp_path, **columns)).standard_error.any()
+    assert not read_experiment(by_name(tmp_path, **columns)).standard_error.any()
 
 
 def test_of_two_without_a_unit_the_one_beside_the_stress_is_its_spread(tmp_path):
@@ -79,15 +73,15 @@ def test_of_two_without_a_unit_the_one_beside_the_stress_is_its_spread(tmp_path)
 
 
 def test_a_spread_of_forces_is_over_the_area_and_is_converted_with_the_stress(tmp_path):
-    file = written(tmp_path, **{"Disp (mm)": 10 * (STRETCH - 1), "Load (N)": STRESS, "Load SEM (mN)": 1e3 * SPREAD})
+    file = by_name(tmp_path, **{"Disp (mm)": 10 * (STRETCH - 1), "Load (N)": STRESS, "Load SEM (mN)": 1e3 * SPREAD})
     data = read_experiment(file, dimensions={"length": "10 mm", "area": "4 mm2"})
     np.testing.assert_allclose(data.standard_error, SPREAD / 4, rtol=1e-9)
-    file = written(tmp_path, **{"Stretch": STRETCH, "True stress (kPa)": STRESS, "SEM (kPa)": SPREAD})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, "True stress (kPa)": STRESS, "SEM (kPa)": SPREAD})
     np.testing.assert_allclose(read_experiment(file).standard_error, SPREAD / STRETCH * 1e-3, rtol=1e-9)
 
 
 def test_rows_that_are_dropped_take_their_errors_along(tmp_path):
-    file = written(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, "SEM (kPa)": SPREAD})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, "SEM (kPa)": SPREAD})
     data = read_experiment(file, every=3)
     np.testing.assert_allclose(data.standard_error, SPREAD[::3] * 1e-3, rtol=1e-9)
     np.testing.assert_allclose(data.where(np.array([False, True, True])).standard_error, SPREAD[3::3] * 1e-3, rtol=1e-9)
@@ -102,7 +96,7 @@ def test_rows_that_are_dropped_take_their_errors_along(tmp_path):
     ],
 )
 def test_a_spread_that_cannot_be_used_is_said_and_the_file_is_read_all_the_same(tmp_path, name, words):
-    file = written(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, name: SPREAD})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, name: SPREAD})
     inspection = tq.inspect(file)
     assert any(words in text for text in inspection.warnings)
     assert not inspection.reading.experiment.standard_error.any()
@@ -120,7 +114,7 @@ def test_a_spread_that_cannot_be_used_is_said_and_the_file_is_read_all_the_same(
 @pytest.mark.parametrize("name", ["Stress (kPa)", "Mean stress (kPa)"])
 def test_ends_of_error_bars_are_no_standard_deviations_and_are_said(tmp_path, upper, lower, half, name):
     above, below = (SPREAD, SPREAD) if "error" in upper else (STRESS + SPREAD, STRESS - SPREAD)
-    file = written(tmp_path, **{"Stretch": STRETCH, name: STRESS, upper: above, lower: below, "n": STRETCH * 0 + 8})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, name: STRESS, upper: above, lower: below, "n": STRETCH * 0 + 8})
     inspection = tq.inspect(file)
     assert any("error bars of the stress" in text and half in text for text in inspection.warnings)
     assert not inspection.reading.experiment.standard_error.any()
@@ -128,7 +122,7 @@ def test_ends_of_error_bars_are_no_standard_deviations_and_are_said(tmp_path, up
 
 def test_beside_ends_of_error_bars_a_standard_error_is_read(tmp_path):
     columns = {"Stretch": STRETCH, "Stress (kPa)": STRESS, "max": STRESS + SPREAD, "min": STRESS - SPREAD}
-    data = read_experiment(written(tmp_path, **columns, SEM=SPREAD))
+    data = read_experiment(by_name(tmp_path, **columns, SEM=SPREAD))
     np.testing.assert_allclose(data.standard_error, SPREAD * 1e-3, rtol=1e-9)
 
 
@@ -143,7 +137,7 @@ def test_beside_ends_of_error_bars_a_standard_error_is_read(tmp_path):
     ],
 )
 def test_a_number_of_specimens_that_the_file_states_is_proposed(tmp_path, line, name, words):
-    file = written(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, name: SPREAD})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, name: SPREAD})
     file.write_text(f"{line}\n{file.read_text()}")
     assert any(words in text for text in tq.inspect(file).warnings)
 
@@ -165,14 +159,14 @@ def test_a_cell_that_is_no_number_leaves_the_column_out_with_a_note(tmp_path):
     ],
 )
 def test_options_that_cannot_be_used_are_refused(tmp_path, options, words):
-    file = written(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, "w": SPREAD, "below": -SPREAD})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, "w": SPREAD, "below": -SPREAD})
     with pytest.raises(InputError) as refusal:
         read_experiment(file, **options)
     assert words in str(refusal.value)
 
 
 def test_inspect_shows_the_column_and_the_error(tmp_path):
-    file = written(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, "SD (kPa)": 0.1 * STRESS})
+    file = by_name(tmp_path, **{"Stretch": STRETCH, "Stress (kPa)": STRESS, "SD (kPa)": 0.1 * STRESS})
     text = str(tq.inspect(file, mean_of=6))
     assert "'SD (kPa)' is standard deviation of the stress" in text
     assert f"error     {0.1 * OF_SIX / 6**0.5:.2g} of the stress (standard error of the mean)" in text

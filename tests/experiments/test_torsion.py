@@ -10,6 +10,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.twisted_disc import apparent_stress, rim_stress
 from tissuq.experiments.units import TORQUE
+from written_files import written
 
 RADIUS, HEIGHT = 10.0, 2.0  # mm
 TWIST = np.linspace(0.0, 0.24, 61)  # rad
@@ -38,11 +39,8 @@ def fung(shear, rate=1.5):
 LAWS = {"mooney-rivlin": (mooney_rivlin, 0.0), "yeoh": (yeoh, -0.19), "fung": (fung, -0.3)}
 
 
-def written(folder, names="Twist (rad),Torque (mN m)", twist=TWIST, torque=None):
-    file = folder / "disc.csv"
-    torque = mooney_rivlin(SHEAR)[1] if torque is None else torque
-    file.write_text("\n".join([names, *(f"{a:.12g},{b:.12g}" for a, b in zip(twist, torque, strict=True))]))
-    return file
+def of_disc(folder, names="Twist (rad),Torque (mN m)", twist=TWIST, torque=None):
+    return written(folder, names, twist, mooney_rivlin(SHEAR)[1] if torque is None else torque, name="disc.csv")
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -83,7 +81,7 @@ def test_both_directions_are_one_odd_curve():
 )
 def test_twist_and_torque_are_recognised_and_converted(tmp_path, names, to_file):
     stress, torque = fung(SHEAR)
-    file = written(tmp_path, names, TWIST * to_file[0], torque * to_file[1])
+    file = of_disc(tmp_path, names, TWIST * to_file[0], torque * to_file[1])
     data = read_experiment(file, mode="simple-shear", dimensions=SIZES)
     np.testing.assert_allclose(data.stretch, SHEAR, atol=1e-9)
     np.testing.assert_allclose(data.stress, stress, atol=0.003 * stress[-1])
@@ -92,18 +90,18 @@ def test_twist_and_torque_are_recognised_and_converted(tmp_path, names, to_file)
 
 
 def test_twist_and_torque_leave_no_choice_of_the_mode(tmp_path):
-    assert read_experiment(written(tmp_path), dimensions=SIZES).mode.name == "simple-shear"
+    assert read_experiment(of_disc(tmp_path), dimensions=SIZES).mode.name == "simple-shear"
 
 
 def test_the_stress_that_a_rheometer_states_is_corrected_where_it_is_said_to_be_of_a_disc(tmp_path):
     stress, torque = fung(SHEAR)
-    file = written(tmp_path, "Shear strain,Shear stress (kPa)", SHEAR, 1e3 * apparent_stress(torque, RADIUS))
+    file = of_disc(tmp_path, "Shear strain,Shear stress (kPa)", SHEAR, 1e3 * apparent_stress(torque, RADIUS))
     data = read_experiment(file, mode="simple-shear", stress_type="torsion")
     np.testing.assert_allclose(data.stress, stress, atol=0.003 * stress[-1])
 
 
 def test_a_twist_that_does_not_begin_at_zero_is_asked_about(tmp_path):
-    file = written(tmp_path, twist=TWIST + 0.1)
+    file = of_disc(tmp_path, twist=TWIST + 0.1)
     with pytest.raises(InputError, match="--zero first"):
         read_experiment(file, mode="simple-shear", dimensions=SIZES)
     for zero in ("first", "0.1 rad", "100 mrad"):
@@ -130,13 +128,13 @@ def test_a_twist_that_does_not_begin_at_zero_is_asked_about(tmp_path):
 )
 def test_what_is_missing_is_asked_for(tmp_path, names, options, words):
     with pytest.raises(InputError) as refusal:
-        read_experiment(written(tmp_path, names), **options)
+        read_experiment(of_disc(tmp_path, names), **options)
     assert words in str(refusal.value)
 
 
 def test_a_torque_against_the_twist_is_refused(tmp_path):
     with pytest.raises(InputError, match="does not have the sign of the twist"):
-        read_experiment(written(tmp_path, torque=-mooney_rivlin(SHEAR)[1]), mode="simple-shear", dimensions=SIZES)
+        read_experiment(of_disc(tmp_path, torque=-mooney_rivlin(SHEAR)[1]), mode="simple-shear", dimensions=SIZES)
 
 
 @pytest.mark.parametrize(
@@ -147,10 +145,9 @@ def test_units_of_torque(unit, newton_mm):
 
 
 def test_a_rheometer_that_moves_its_gap_does_not_twist(tmp_path):
-    gap = np.linspace(10.0, 8.0, 30)
-    rows = [f"{k * 1e-7},{k * 1e-6},{h},{10 * k / 30}" for k, h in enumerate(gap)]
-    path = tmp_path / "gap.csv"
-    path.write_text("\n".join(["Encoder (rad),Torque (Nm),Gap (mm),Normal force (N)", *rows]) + "\n")
+    gap, number = np.linspace(10.0, 8.0, 30), np.arange(30)
+    columns = number * 1e-7, number * 1e-6, gap, number / 3
+    path = written(tmp_path, "Encoder (rad),Torque (Nm),Gap (mm),Normal force (N)", *columns, name="gap.csv")
     data = read_experiment(path, dimensions={"diameter": "8 mm"}, compression_positive=True)
     assert data.mode.name == "uniaxial"
     np.testing.assert_allclose(data.stretch, gap / 10)
@@ -161,9 +158,7 @@ def test_a_rheometer_that_moves_its_gap_does_not_twist(tmp_path):
 def rate_file(folder, header="Step time [s],Shear rate [1/s],Stress [Pa]", time=None):
     """A disc that is sheared faster and faster: an amount of shear of 0.01 t + 0.005 t^2 at the time t."""
     time = np.linspace(0, 4, 50) if time is None else time
-    rows = [f"{t:.6f},{0.01 * (1 + t):.8f},{500 * t:.3f}" for t in time]
-    (folder / "rate.csv").write_text("\n".join([header, *rows]) + "\n")
-    return folder / "rate.csv"
+    return written(folder, header, time, 0.01 * (1 + time), 500 * time, name="rate.csv")
 
 
 def test_a_rate_of_shear_is_summed_over_time(tmp_path):
@@ -185,9 +180,7 @@ def test_a_rate_of_shear_without_a_time_that_goes_on_is_refused(tmp_path):
 @pytest.mark.parametrize("options", [{"mean_of": 6}, {"columns": {"sem": "SEM (mN m)"}}])
 def test_the_spread_of_torques_is_not_used_and_this_is_said(tmp_path, options):
     torque = mooney_rivlin(SHEAR)[1]
-    rows = (f"{a:.12g},{b:.12g},{0.01 * b + 1:.12g}" for a, b in zip(TWIST, torque, strict=True))
-    file = tmp_path / "disc.csv"
-    file.write_text("\n".join(["Twist (rad),Torque (mN m),SEM (mN m)", *rows]))
+    file = written(tmp_path, "Twist (rad),Torque (mN m),SEM (mN m)", TWIST, torque, 0.01 * torque + 1)
     test = {"mode": "simple-shear", "dimensions": SIZES}
     assert any("column 'SEM (mN m)' is not used" in text for text in tq.inspect(file, **test).warnings)
     with pytest.raises(InputError, match=r"not for the torque of a disc. Leave it out"):
@@ -197,9 +190,7 @@ def test_the_spread_of_torques_is_not_used_and_this_is_said(tmp_path, options):
 @pytest.mark.parametrize("stress_type", [None, "engineering", "torsion"])
 def test_a_torque_beside_the_stress_raises_a_note_until_the_type_of_stress_is_said(tmp_path, stress_type):
     shear = np.linspace(0.01, 0.5, 30)
-    path = tmp_path / "shear.csv"
-    rows = "".join(f"{100 * g:.6f},{1000 * g:.6f},{g:.6f}\n" for g in shear)
-    path.write_text(f"Shear strain (%),Shear stress (Pa),Torque (mN m)\n{rows}")
+    path = written(tmp_path, "Shear strain (%),Shear stress (Pa),Torque (mN m)", 100 * shear, 1000 * shear, shear)
     warnings = tq.inspect(path, mode="simple-shear", stress_type=stress_type).warnings
     assert any("--stress-type torsion, which corrects it" in text for text in warnings) is (stress_type is None)
 

@@ -11,6 +11,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.read import read_experiment
+from written_files import message, written
 
 STRETCH = np.array([[1.0, 1.0], [1.1, 1.05], [1.2, 1.1], [1.3, 1.15]])
 STRESS = mooney_rivlin(STRETCH)
@@ -18,21 +19,8 @@ AXES = "stretch x,stretch y,stress x [kPa],stress_y [kPa]"
 BIAXIAL = {"mode": "biaxial"}
 
 
-def written(folder, heading, *columns):
-    path = folder / "test.csv"
-    rows = "".join(",".join(f"{value:.12g}" for value in row) + "\n" for row in zip(*columns, strict=True))
-    path.write_text(f"{heading}\n{rows}")
-    return path
-
-
 def of_axes(folder, heading=AXES, stretch=STRETCH, stress=STRESS):
     return written(folder, heading, *stretch.T, *(1e3 * stress).T)
-
-
-def message(path, **options):
-    with pytest.raises(InputError) as caught:
-        read_experiment(path, **options)
-    return str(caught.value)
 
 
 def test_both_axes_of_a_machines_file_are_fitted_to_the_parameters_they_were_made_with(tmp_path):

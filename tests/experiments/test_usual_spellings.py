@@ -11,17 +11,12 @@ import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.units import FORCE, LENGTH, stress_unit
+from written_files import written
 
 L = ramp()
 P = 1e3 * neo_hookean(L)  # kPa
 D, N = 20 * (L - 1), P * 8e-3  # mm and N, for a length of 20 mm and a section of 8 mm2
 SIZES = {"length": "20 mm", "area": "8 mm2"}
-
-
-def written(folder, head, *columns, separator=",", name="test.csv", form="{:.8g}".format, encoding="utf-8"):
-    rows = [separator.join(map(form, row)) for row in zip(*columns, strict=True)]
-    (folder / name).write_text("\n".join([head, *rows]) + "\n", encoding=encoding)
-    return folder / name
 
 
 def check(path, **options):

@@ -14,6 +14,7 @@ from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.inspection import inspect
 from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.tests_in_file import read_tests
+from written_files import message
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
 
@@ -41,12 +42,6 @@ def book(tmp_path):
     specimen_sheet(book.create_sheet("Probe 2"), length=25.0)
     book.save(tmp_path / "zwick.xlsx")
     return tmp_path / "zwick.xlsx"
-
-
-def message(path, **options):
-    with pytest.raises(InputError) as caught:
-        read_experiment(path, **options)
-    return str(caught.value)
 
 
 @pytest.mark.parametrize("sheet", ["Probe 2", 3, "3"])

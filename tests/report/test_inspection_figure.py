@@ -19,7 +19,7 @@ def test_every_region_is_marked_where_its_rows_were_recorded(tmp_path, name):
     path = tmp_path / "test.csv"
     np.savetxt(path, np.column_stack([stretch, stress]), "%.6f", ",", header="stretch,stress [kPa]", comments="")
     inspection = tq.inspect(path)
-    (regions,) = inspection.reading.regions
+    regions = inspection.reading.tested[0].regions
     assert regions
     recorded = curve_figure(inspection).axes[0]
     lines = {line.get_label(): line for line in recorded.lines}

@@ -79,7 +79,7 @@ def account(files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[st
             break
     start = perf_counter()
     if tests and not record["error"]:
-        inspections = [Inspection.of(of_test) for _, of_test in tests]
+        inspections = [Inspection(of_test) for _, of_test in tests]
         record["text"] = str(inspections[0]) if len(tests) == 1 else overview(inspections)
         pairs = list(zip(tests, inspections, strict=True))
         record["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
@@ -151,7 +151,7 @@ def _curve(reading: Reading, number: int) -> dict[str, Any]:
     used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
     regions = [
         {"kind": region.kind, **_points(used.stretch[number][region.rows], used.stress[number][region.rows], unit)}
-        for region in reading.regions[number]
+        for region in reading.tested[number].regions
         if len(region.rows)
     ]
     return {

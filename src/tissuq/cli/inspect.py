@@ -69,7 +69,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
         else:
             file_tests = find_tests(path, settings, files)
         tests += file_tests
-    inspections = [Inspection.of(reading) for _, reading in tests]
+    inspections = [Inspection(reading) for _, reading in tests]
     print(inspections[0] if len(tests) == 1 else overview(inspections))
     if write is not None:
         write.write_text(study_file([of_test for of_test, _ in tests], inspections, write.parent), encoding="utf-8")

@@ -69,7 +69,7 @@ def _draw_recorded(axis: Axes, reading: Reading, number: int) -> None:
     stretch, stress = reading.recorded.stretch[number], reading.recorded.stress[number] / unit.to_mpa
     axis.plot(stretch, stress, "-", color=BASE, lw=1, label="all rows")
     axis.plot(stretch[used.rows], stress[used.rows], ".", color=BAND, ms=4, label="rows used")
-    for region in reading.regions[number]:
+    for region in reading.tested[number].regions:
         if len(region.rows):
             marked = np.full(len(stress), np.nan)  # gaps between runs of rows
             marked[used.rows[region.rows]] = stress[used.rows[region.rows]]

@@ -287,7 +287,7 @@ def _read(settings: CalibrationSettings, folder: Path) -> tuple[dict[str, Measur
 
 
 def _table(path: Path, settings: CalibrationSettings) -> Table:
-    table = only_rows(read_table(path, settings.skip_rows, settings.sheet), settings.only)
+    table = only_rows(read_table(path, skip_rows=settings.skip_rows, sheet=settings.sheet), settings.only)
     if settings.leave_out is None:
         return table
     remaining = np.flatnonzero(~rows_in(settings.leave_out, table.lines, table.file))

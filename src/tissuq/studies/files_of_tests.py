@@ -111,7 +111,7 @@ def measured(
                              "is of one test; leave it out.")  # fmt: skip
         return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(readings)
     if len(tests) > len(files):
-        say("\n".join([*lines_of_tests(list(map(Inspection.of, readings))), ""]))
+        say("\n".join([*lines_of_tests(list(map(Inspection, readings))), ""]))
     if len(files) == 1:
         _check_whole(files[0], readings, specimens)
     stated_noise = noise if noise and len(noise) > 1 else None
@@ -209,7 +209,7 @@ def tests_in_words(tests: Sequence[tuple[Mapping[str, Any], Reading]]) -> str:
     from tissuq.experiments.reading.inspection import Inspection
 
     more = f", and {len(tests) - 1} more tests" if len(tests) > 1 else ""
-    return f"{Inspection.of(tests[0][1]).line}{more}"
+    return f"{Inspection(tests[0][1]).line}{more}"
 
 
 def tables_of(file: Path, reading: Mapping[str, Any]) -> list[Table]:
@@ -218,7 +218,8 @@ def tables_of(file: Path, reading: Mapping[str, Any]) -> list[Table]:
 
     path = file if file.exists() else Path(str(file).partition("#")[0])
     try:
-        return list(read_tables(path, reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")))
+        skip_rows, sheet, number = reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")
+        return read_tables(path, skip_rows=skip_rows, sheet=sheet, table=number)
     except InputError:
         return []
 

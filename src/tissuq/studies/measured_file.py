@@ -143,11 +143,11 @@ class MeasuredFile(ReadingSettings):
 
     def mode_stated(self, folder: Path = Path()) -> str | None:
         """Return the loading mode that the settings, the file, its name or its columns say; None where none does."""
-        from tissuq.experiments.reading.experiment_file import table_of
         from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, mode_of
+        from tissuq.experiments.reading.tables import read_table
 
         path, options = folder / self.file, self.reading_options | {"mode": self.mode or None}
-        mode, source = mode_of(path, table_of(path, options), options)
+        mode, source = mode_of(path, read_table(path, **options), options)
         return None if source == DEFAULT_SOURCE else str(getattr(mode, "name", mode))
 
     def experiment(self, folder: Path = Path()) -> Experiment:

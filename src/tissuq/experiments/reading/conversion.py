@@ -85,7 +85,7 @@ def measured_rows(
         rows=np.arange(len(table.rows)),
         stretch=np.stack(stretches),
         stress=np.stack([load.stress for load in loads]),
-        standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
+        standard_error=np.stack([np.broadcast_to(spread.standard_error, len(table.rows)) for spread in spreads]),
         labels=tuple(label.removeprefix(LONG) for label in labels),
         axial_stretch=None if axial is None else axial.values,
     )

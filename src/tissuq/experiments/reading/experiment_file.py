@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Unpack, cast
 
@@ -30,14 +29,7 @@ from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_c
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice, adding
-from tissuq.experiments.reading.regions import (
-    AUTO,
-    Region,
-    TestedStress,
-    least_errors,
-    regions_of,
-    tested_stresses,
-)
+from tissuq.experiments.reading.regions import AUTO, TestedStress, least_errors, tested_stresses
 from tissuq.experiments.reading.rows_of_tests import (
     SeveralSpecimens,
     columns_only,
@@ -116,28 +108,18 @@ class Reading:
         """The cycles of the rows of the experiment."""
         return self.tested[0].cycles
 
-    @cached_property
-    def regions(self) -> list[list[Region]]:
-        """What happened in the test besides elastic loading, as each stress shows it."""
-        return [regions_of(tested) for tested in self.tested]
-
 
 def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     """Read a file as `tissuq.read` does, and keep what was done on the way."""
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     if (mode := plain.get("mode")) is not None:
         checked_mode(mode, plain)
-    table = table_of(path, plain)
+    table = read_table(path, **plain)
     rows = only_rows(table, columns_only(table, plain.get("only")))
     reading = read_rows(rows, table.file if is_data_frame(path) else path, **plain)
     if refusal := other_label(table, reading.experiment, plain.get("only")):
         raise InputError(refusal)
     return reading
-
-
-def table_of(path: Any, options: ReadingOptions) -> Table:
-    """Return the table of a file that the options choose."""
-    return read_table(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
 
 
 def read_rows(

@@ -74,11 +74,11 @@ def data_warnings(reading: Reading) -> tuple[ResultWarning, ...]:
     """
     labels = reading.used.labels
     warnings = [ResultWarning(text, *DOUBTFUL if is_doubtful(text) else CAUTION) for text in reading.notes]
-    for kind_and_code in dict.fromkeys((region.kind, region.code) for regions in reading.regions for region in regions):
-        kind, stated = kind_and_code
+    kinds_and_codes = [(region.kind, region.code) for tested in reading.tested for region in tested.regions]
+    for kind, stated in dict.fromkeys(kinds_and_codes):
         of_kind = (
-            [region.text for region in regions if (region.kind, region.code) == kind_and_code]
-            for regions in reading.regions
+            [region.text for region in tested.regions if (region.kind, region.code) == (kind, stated)]
+            for tested in reading.tested
         )
         texts = labelled(labels, [" ".join(sentences) for sentences in of_kind])
         code, severity = REGION_CODES.get(kind, CAUTION)
@@ -178,7 +178,7 @@ def _difference_of_cycles(reading: Reading, number: int) -> float:
 
 def _change_of_peaks(reading: Reading, number: int) -> str:
     """Return by how much the stress at the peaks of equal cycles changes, as a clause; nothing where it hardly does."""
-    if DISTURBED.intersection(region.kind for region in reading.regions[number]):
+    if DISTURBED.intersection(region.kind for region in reading.tested[number].regions):
         return ""
     peaks = [cycle.peak for cycle in reading.used_cycles]
     reached, stress = reading.used.course[peaks], reading.used.stress[number][peaks]
@@ -213,7 +213,7 @@ def _hysteresis(reading: Reading, number: int) -> str:
 
 def _hysteresis_share(reading: Reading, number: int) -> float:
     """Return by how much loading and unloading differ, over the largest stress; zero where that is not worth a word."""
-    if DISTURBED.intersection(region.kind for region in reading.regions[number]):
+    if DISTURBED.intersection(region.kind for region in reading.tested[number].regions):
         return 0.0
     course, stress = reading.used.course, reading.used.stress[number]
     share = max(_gap_of_branches(course, stress, cycle) for cycle in reading.used_cycles)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np
@@ -37,22 +38,12 @@ class Inspection:
     ----------
     reading : Reading
         The experiment and what was done on the way to it.
-    noise_sds : tuple of float or None
-        Estimate of the noise of the engineering stress, MPa, of each stress of the loading mode; None where the
-        measurements do not show it.
     worded : callable
         How notes are worded: as they are, or in Python's terms.
     """
 
     reading: Reading
-    noise_sds: tuple[float | None, ...]
     worded: Callable[[str], str] = str
-
-    @classmethod
-    def of(cls, reading: Reading, worded: Callable[[str], str] = str) -> Inspection:
-        """Return what was understood of a file that has been read."""
-        course, stresses = reading.used.course, reading.used.stress
-        return cls(reading, tuple(noise_between_neighbours(course, stress) for stress in stresses), worded)
 
     @property
     def line(self) -> str:
@@ -70,6 +61,12 @@ class Inspection:
         """What the measured stresses are along: stretch, or amount of shear."""
         name = self.reading.experiment.mode.abscissa_control.name
         return "stretch" if "stretch" in name else name
+
+    @cached_property
+    def noise_sds(self) -> tuple[float | None, ...]:
+        """The noise of each stress of the loading mode, MPa; None where the measurements do not show it."""
+        used = self.reading.used
+        return tuple(noise_between_neighbours(used.course, stress) for stress in used.stress)
 
     @property
     def noise_sd(self) -> float | None:
@@ -100,8 +97,8 @@ class Inspection:
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
-        cells = f", separated by {SEPARATORS[table.separator]}; rows in lines {_span(table.lines)}, {head}"
-        spans_of_rows = f"; {table.counted}s {_span(table.lines)}, counted from {int(table.counted != 'row')}"
+        cells = f", separated by {SEPARATORS[table.separator]}; rows in {table.span}, {head}"
+        spans_of_rows = f"; {table.span}, counted from {int(table.counted != 'row')}"
         yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else spans_of_rows}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
@@ -169,14 +166,14 @@ class Inspection:
         )
 
     def _cycle_table(self) -> Iterator[str]:
-        cycles, stretch = self.reading.cycles, self.reading.recorded.course
+        cycles, stretch, lines = self.reading.cycles, self.reading.recorded.course, self.reading.table.lines
         mean = "mean " * (len(self.reading.used.stretch) > 1)
         yield f"{f'cycle     {self.reading.table.counted}s':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
         for number, cycle in list(enumerate(cycles, start=1))[:MAX_CYCLES_SHOWN]:
             rows = cycle.rows()
             ends = (stretch[row] for row in (rows[0], cycle.peak, rows[-1]))
             label = "" if cycle.label == str(number) else cycle.label
-            span = _span(self.reading.table.lines[rows[0] : rows[-1] + 1])
+            span = f"{lines[rows[0]]} to {lines[rows[-1]]}"
             yield f"{number:<9} {span:<18}" + "".join(f"{end:>13.4f}" for end in ends) + f"  {label}".rstrip()
         if len(cycles) > MAX_CYCLES_SHOWN:
             yield f"... {len(cycles)} cycles in all"
@@ -199,7 +196,7 @@ def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
     """
     with refusals_worded_for(path):
         reading = read_file(path, **options)
-        return Inspection.of(reading, wording_for(path, reading.experiment.stress_unit))
+        return Inspection(reading, wording_for(path, reading.experiment.stress_unit))
 
 
 def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:
@@ -236,10 +233,6 @@ def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:
 def _typed(measure: str) -> str:
     """Return the name of a measure of strain or stress before what it is of; nothing of the engineering one."""
     return "" if measure == "engineering" else f"{measure} "
-
-
-def _span(lines: Sequence[int]) -> str:
-    return f"{lines[0]} to {lines[-1]}"
 
 
 def _wrapped(label: str, text: str) -> str:

@@ -68,7 +68,8 @@ class StrainMeasure:
         convert, formula = (self.shear, self.shear_formula) if is_shear else (self.stretch, self.formula)
         if convert is None:
             what = "an amount of shear" if is_shear else "a stretch"
-            alternatives = (name for name, measure in STRAIN_MEASURES.items() if measure.tells(is_shear))
+            measures = STRAIN_MEASURES.items()
+            alternatives = (name for name, measure in measures if (measure.shear if is_shear else measure.stretch))
             raise InputError(
                 f"strain of type '{self.name}' does not tell {what}. Say which it is: --strain-type "
                 f"{' or '.join(alternatives)}; or add a column with {what} to the file."
@@ -82,10 +83,6 @@ class StrainMeasure:
                 "and the type (--strain-type)."
             )
         return convert(values), formula
-
-    def tells(self, is_shear: bool) -> bool:
-        """Return whether it tells the amount of shear, or else the stretch."""
-        return bool(self.shear if is_shear else self.stretch)
 
 
 STRAIN_MEASURES = {

@@ -12,7 +12,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import InflatedTube, LoadingMode, loading_mode
 from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
-from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
 
 TURNS = {"load": ("load",), "deformation": ("deformation",), "both": ("deformation", "load")}
 """What signs may be changed of, by what asks for it."""
@@ -68,42 +68,43 @@ class PythonOptions(ReadingOptions, total=False):
     """The options of :func:`tissuq.read`, with entries of `columns` and `dimensions`, and the unit, by themselves."""
 
     stretch: str | int | None
+    stretch2: str | int | None
     strain: str | int | None
+    strain2: str | int | None
     displacement: str | int | None
+    displacement2: str | int | None
     shear: str | int | None
+    shear2: str | int | None
     twist: str | int | None
+    twist2: str | int | None
     rate: str | int | None
+    rate2: str | int | None
     sliding: str | int | None
+    sliding2: str | int | None
     stress: str | int | None
+    stress2: str | int | None
     torque: str | int | None
+    torque2: str | int | None
     force: str | int | None
-    pressure: str | int | None
+    force2: str | int | None
     outer_diameter: str | int | None
     inner_diameter: str | int | None
+    pressure: str | int | None
     total_force: str | int | None
-    stretch2: str | int | None
-    strain2: str | int | None
-    displacement2: str | int | None
-    shear2: str | int | None
-    twist2: str | int | None
-    rate2: str | int | None
-    sliding2: str | int | None
-    stress2: str | int | None
-    torque2: str | int | None
-    force2: str | int | None
-    length: Any
     area: Any
     width: Any
     thickness: Any
     diameter: Any
+    length: Any
     unit: str | None
 
 
-COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "sliding", "stress", "torque", "force")
-"""Roles of columns that are options by themselves; ``length`` is that of the specimen."""
-PARTS = {name: "columns" for role in COLUMNS for name in (role, f"{role}2")}
-PARTS |= dict.fromkeys(ROLES_OF_TUBE, "columns") | dict.fromkeys(DIMENSION_NAMES, "dimensions")
-"""Options that are entries of another one."""
+PARTS = {
+    name: "dimensions" if name in DIMENSION_NAMES else "columns"
+    for name in PythonOptions.__annotations__
+    if name not in (*READING_OPTIONS, "unit")
+}
+"""Options that are entries of another one; ``length`` is that of the specimen."""
 NAMES_OF_SHELL = {"estimand": "tolerances"}
 """Options of the shell that have another name in Python."""
 

@@ -165,6 +165,11 @@ class TestedStress:
         rows = self.branches[0]
         return staircase_of(self.used.stretch[self.number][rows], self.stress[rows])
 
+    @cached_property
+    def regions(self) -> list[Region]:
+        """What happened besides elastic loading, kind by kind."""
+        return [region for check in CHECKS for region in check(self)]
+
     def lines(self, rows: IndexArray) -> str:
         """Return the lines of the file in which rows stand, as one gives them to ``--leave-out``."""
         return self.used.table.lines_of(rows)
@@ -178,11 +183,6 @@ def tested_stresses(used: MeasuredRows, mode: LoadingMode, unit: StressUnit) -> 
     """Return every stress of the rows that are used; ``unit`` is that in which people want to read them."""
     cycles = find_cycles(used.table, used.course, mode.controls[0].reference)
     return tuple(TestedStress(used, number, cycles, mode, unit) for number in range(len(used.labels)))
-
-
-def regions_of(tested: TestedStress) -> list[Region]:
-    """Return what happened in a test, kind by kind."""
-    return [region for check in CHECKS for region in check(tested)]
 
 
 def least_errors(tests: Sequence[TestedStress]) -> dict[str, float]:

@@ -12,13 +12,14 @@ from typing import Unpack
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.experiment_file import Reading, table_of
+from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format
 from tissuq.experiments.reading.layout import WHITESPACE, is_comment, split
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import only_rows, row_names
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 from tissuq.experiments.reading.text_file import read_lines
 
@@ -71,7 +72,7 @@ def read_column(
         As for `tissuq.read_experiment`.
     """
     only = options.get("only") or {}
-    table = only_rows(table_of(path, options), only)
+    table = only_rows(read_table(path, **options), only)
     column = find_column(table, "specimen", specimen)
     labels = np.array(row_names(table, column))
     if (labels == "").any():
@@ -164,7 +165,7 @@ def covariate_columns(
     path: str | os.PathLike[str], specimen: str, names: Sequence[str], **options: Unpack[ReadingOptions]
 ) -> CovariateTable:
     """Return columns of a file of measurements that say something of the specimens, which another column names."""
-    table = only_rows(table_of(path, options), options.get("only"))
+    table = only_rows(read_table(path, **options), options.get("only"))
     column = find_column(table, "specimen", specimen)
     columns = {name: find_column(table, "covariate", name) for name in names}
     return CovariateTable(table, row_names(table, column), column, columns)

@@ -33,7 +33,7 @@ MOST_ROWS = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Standard errors (n,) of the mean stress, MPa, their column, what that holds, and how they were obtained.
+    """Standard errors (n,) of the mean stress, MPa, zero where there are none; their column, what it holds, and how.
 
     ``problem`` says why a column is not used, or two columns of ends of error bars; otherwise ``column`` is None where
     there is none.
@@ -41,13 +41,9 @@ class Spread:
 
     column: int | None = None
     kind: str = ""
-    standard_error: Column | None = None
+    standard_error: Column | float = 0.0
     source: str = ""
     problem: str = ""
-
-    def standard_errors(self, count: int) -> Column:
-        """Return the standard errors of so many rows, zero where there are none."""
-        return np.zeros(count) if self.standard_error is None else self.standard_error
 
 
 def spread_of(

@@ -92,24 +92,20 @@ HEAD_LINES = 20
 """Lines of a file in which a comment may state its mode."""
 
 
-def find_mode(file: str | os.PathLike[str], words: Sequence[str] = ()) -> tuple[str, str]:
-    """Return the mode that a file states, and where; empty texts where it states none.
+def mode_named(stem: str, words: Sequence[str] = ()) -> tuple[str, str]:
+    """Return the mode that the name of a file without its ending says, and where; empty texts where it says none.
 
-    A comment line such as ``# mode: planar`` goes before other words, such as the name of a sheet, the last ones first,
-    and these before the name of the file.
+    Other words, such as the name of a sheet, go before it, the last ones first.
 
     Examples
     --------
-    >>> find_mode("liver-7-planar.csv"), find_mode("simple_shear.csv"), find_mode("liver.xlsx", ["Sheet 1", "tension"])
+    >>> mode_named("liver-7-planar"), mode_named("simple_shear"), mode_named("liver", ["Sheet 1", "tension"])
     (('planar', 'the name of the file'), ('simple-shear', 'the name of the file'), ('uniaxial', "'tension'"))
     """
-    path = Path(file)
-    if mode := mode_in_comment(path):
-        return mode, "a comment in the file"
     for word in reversed([word for word in words if not OF_MACHINE.search(word)]):
         if mode := _mode_of_words(word):
             return mode, f"'{word}'"
-    mode = _mode_of_words(path.stem)
+    mode = _mode_of_words(stem)
     return mode, "the name of the file" if mode else ""
 
 
@@ -134,15 +130,16 @@ def mode_of(
     """
     if (wanted := options.get("mode")) is not None:
         return wanted, GIVEN
-    mode, source, is_by_word = "", "", False
-    for column in range(len(table.names)) if not mode_in_comment(Path(file)) else ():
+    path, is_by_word = Path(file), False
+    mode, source = _mode_of_words(comment_on_mode(path)), "a comment in the file"
+    for column in range(len(table.names)) if not mode else ():
         _check_modes_in_column(table, column)
         if len(modes := modes_in_column(table, column)) == 1:
             mode, source = modes.pop(), f"column {table.label(column)}"
             break
     if not mode:
-        mode, source = find_mode(file, [table.sheet, table.title, *words])
-        is_by_word = mode == DEFAULT_MODE and not mode_in_comment(Path(file))  # which a tube may be called, too: axial
+        mode, source = mode_named(path.stem, [table.sheet, table.title, *words])
+        is_by_word = mode == DEFAULT_MODE  # which a tube may be called, too: axial
     columns = options.get("columns") or {}
     if not mode and columns.keys() & {*SHEARS, "torque"}:
         mode, source = "simple-shear", "a column of shear"
@@ -154,7 +151,7 @@ def mode_of(
     if not (mode or columns or options.get("axis")):
         mode, source = _mode_of_columns(table, options.get("dimensions") or {})
     if not mode:
-        _check_abbreviations(table, Path(file).stem, table.sheet)
+        _check_abbreviations(table, path.stem, table.sheet)
     return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
 
 
@@ -280,11 +277,6 @@ def _mode_of_columns(table: Table, sizes: Collection[str]) -> tuple[str, str]:
     if not is_disc or any(map(table.varies, gaps)):
         return "", ""
     return "simple-shear", "columns of twist and torque"
-
-
-def mode_in_comment(file: Path) -> str:
-    """Return the mode that a comment at the head of a file states, or an empty text."""
-    return _mode_of_words(comment_on_mode(file))
 
 
 def comment_on_mode(file: Path) -> str:

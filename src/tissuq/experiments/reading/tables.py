@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import lru_cache
 from io import StringIO
 from itertools import pairwise
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plain_tables import with_plain_numbers, without_statements_beside, without_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
@@ -52,7 +53,7 @@ CACHED_FILES = 2
 """Files whose tables are remembered: tests of one file are read one after another."""
 
 
-def read_table(path: Any, skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None) -> Table:
+def read_table(path: Any, **options: Unpack[ReadingOptions]) -> Table:
     """Return the table in a file, or in memory; as `read_tables`, where that is one.
 
     Raises
@@ -60,7 +61,7 @@ def read_table(path: Any, skip_rows: int = 0, sheet: str | int | None = None, nu
     InputError
         When there are several, with how to choose.
     """
-    tables = read_tables(path, skip_rows, sheet, number)
+    tables = read_tables(path, **options)
     if len(tables) == 1:
         return tables[0]
     sheets = list(dict.fromkeys(table.sheet for table in tables))
@@ -73,9 +74,7 @@ def read_table(path: Any, skip_rows: int = 0, sheet: str | int | None = None, nu
     raise InputError(f"{path} holds several tables: {of_file}. Say which: table=1 (--table 1). {ALL_TESTS}")
 
 
-def read_tables(
-    path: Any, skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None
-) -> list[Table]:
+def read_tables(path: Any, **options: Unpack[ReadingOptions]) -> list[Table]:
     """Return the tables in a file, where lines above them, names, units and rows are recognised, or that in memory.
 
     Tables with the same names that go on from one to the next, in time or without one in every column, are one.
@@ -85,18 +84,15 @@ def read_tables(
     path : str or path, or table
         Comma-, semicolon-, tab- or blank-separated text, or a workbook; or a table in memory, such as a DataFrame of
         pandas (`tissuq.experiments.reading.data_frame`).
-    skip_rows : int
-        Number of lines at the top of the file to pass over unseen.
-    sheet : str or int, optional
-        Name or number (from 1) of a workbook's sheet; without it all that hold tables.
-    number : int, optional
-        Which of several tables in a text or sheet, from 1; without it all.
+    options
+        Of `tissuq.read`, of which ``skip_rows``, ``sheet`` and ``table`` are looked at; without these it is all tables.
 
     Raises
     ------
     InputError
         When the file cannot be read, holds no table of numbers, or its rows do not match its header.
     """
+    skip_rows, sheet, number = options.get("skip_rows", 0), options.get("sheet"), options.get("table")
     if not isinstance(skip_rows, int) or skip_rows < 0:
         raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
     if is_data_frame(path):

@@ -162,7 +162,7 @@ def find_tests_in_file(
     InputError
         As `read_tests`, and where some tests say in which loading mode they were measured, and others do not.
     """
-    tables = read_tables(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
+    tables = read_tables(path, **options)
     path = tables[0].file if is_data_frame(path) else path
     has_sheets = len({table.sheet for table in tables}) > 1
     tests, refused = list[TestInFile](), list[tuple[Table, InputError, float, str]]()
