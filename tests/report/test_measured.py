@@ -1,4 +1,4 @@
-"""What pages say of the data: how every file was read, and as what the stress was taken."""
+"""What pages say of the data: how every file was read, as what the stress was taken, and its random errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import stress_unit
-from tissuq.report.measured import specimens_section
+from tissuq.report.measured import noise_in_words, specimens_section
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,15 @@ def test_a_page_of_specimens_says_how_they_were_read_and_what_was_fitted(tmp_pat
     assert "engineering stress from column 'stress (kPa)' in kPa" in sources[1]
     assert "W = C10 (I1 - 3) (Treloar 1943), was fitted to every specimen." in law
     assert words in law
+
+
+@pytest.mark.parametrize("noise", ["independent", "proportional"])
+def test_unknown_noise_of_several_tests_is_said_to_be_in_proportion_to_their_scatter(noise):
+    stretch = np.linspace(1.02, 1.4, 12)
+    tests = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.01, seed=seed) for seed in (1, 2)]
+    found = {
+        count: noise_in_words(None, tq.fit(tests[:count], discrepancy="none", noise=noise, tolerances="as-tested"))
+        for count in (1, 2)
+    }
+    words = ", of several tests in the proportions in which they scatter about smooth curves"
+    assert found[2] == found[1] + words * (noise == "independent")

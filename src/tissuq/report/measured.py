@@ -111,11 +111,13 @@ def noise_of_specimens(fits: Mapping[str, Posterior], unit: StressUnit) -> str:
 
 def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:
     """Return what the random errors of single measurements are taken to be."""
-    noise, lag, settings = posterior.model.noise, posterior.model.fitted_errors.lag, study.settings
+    noise, lag = posterior.model.noise, posterior.model.fitted_errors.lag
     if noise.parameters:
-        return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "")
-    values = [test.noise_sd for test in settings.tests if test.noise_sd is not None]
-    sizes = ", ".join(f"{value:g}" for value in values) or f"{settings.noise_sd:g}"
+        has_ratios = len(posterior.model.experiment.tests) > 1 and not noise.depends_on_level
+        of_tests = ", of several tests in the proportions in which they scatter about smooth curves" * has_ratios
+        return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "") + of_tests
+    values = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
+    sizes = ", ".join(f"{value:g}" for value in values) or f"{study.settings.noise_sd:g}"
     of_means = " of single measurements, of means that over the root of their number"
     return f"sd {sizes} {study.experiment.stress_unit}{of_means * (study.experiment.averaged_at_most > 1)}"
 
