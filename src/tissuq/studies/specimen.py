@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -135,7 +136,7 @@ def run_specimen(
     unit = stress_unit(experiment.stress_unit)
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
-    priors_in_mpa(settings, [material], experiment)  # which refuses those that no fit has
+    check_priors(settings, chain.from_iterable(symbols.values()))
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
@@ -247,15 +248,25 @@ def priors_in_mpa(settings: SpecimenSettings, laws: Iterable[Material], experime
     InputError
         When there is one of a parameter that no fit has.
     """
-    unit = stress_unit(experiment.stress_unit)
     of_fits = (parameters_of(settings, law, name, experiment) for law in laws for name in _names(settings))
-    parameters_by_name = {p.symbol: p for parameters in of_fits for p in parameters}
-    unknown = sorted(set(settings.priors) - set(parameters_by_name))
-    if unknown:
+    parameters = list(chain.from_iterable(of_fits))
+    check_priors(settings, parameters)
+    return _priors(settings, parameters, stress_unit(experiment.stress_unit))
+
+
+def check_priors(settings: SpecimenSettings, parameters: Iterable[Parameter]) -> None:
+    """Refuse priors of what is none of the parameters of any fit.
+
+    Raises
+    ------
+    InputError
+        When there is one.
+    """
+    symbols = dict.fromkeys(parameter.symbol for parameter in parameters)
+    if unknown := sorted(settings.priors.keys() - symbols.keys()):
         raise InputError(
-            f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(parameters_by_name)}."
+            f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(symbols)}."
         )
-    return _priors(settings, parameters_by_name.values(), unit)
 
 
 def _priors(settings: SpecimenSettings, parameters: Iterable[Parameter], unit: StressUnit) -> dict[str, Prior]:
