@@ -19,6 +19,7 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import said_by
 from tissuq.report.tables import significant
 from tissuq.studies.design import DesignStudy
+from tissuq.studies.fit_settings import SpecimenSettings
 from tissuq.studies.run_settings import DesignSettings
 
 if TYPE_CHECKING:
@@ -48,8 +49,6 @@ NEXT = (
     "make the first of these tests{whose}{again}, and fit it together with the data: "
     "tissuq fit DATA.csv NEW.csv{options}"
 )
-DEFAULTS = ("neo-hookean", "auto")
-"""Material and discrepancy of a fit that are not named in its command."""
 OR_AGAIN, AS_MUCH = " (the same test again lowers it as much)", 0.01
 """What is said of a repeat of the data, and by how much of the sd now another test must be better."""
 BEYOND = UNSTABLE
@@ -71,8 +70,9 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     is_as_much = len(again) and again.iloc[-1]["reduction"] > best["reduction"] - AS_MUCH
     modes = f" --mode {tests[0].mode.name} --mode {best['mode']}" if len(tests) == 1 else ""
     whose = " on another specimen" * is_other
-    used = {"material": model.material.name, "discrepancy": model.discrepancy.name}
-    fitted = "".join(f" --{option} {name}" for option, name in used.items() if name not in DEFAULTS)
+    default = {name: SpecimenSettings.model_fields[name].default for name in ("material", "discrepancies")}
+    fitted = f" --material {model.material.name}" * (model.material.name != default["material"])
+    fitted += f" --discrepancy {model.discrepancy.name}" * ((model.discrepancy.name,) != default["discrepancies"])
     test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=fitted + modes + errors)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
