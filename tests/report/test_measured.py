@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import stress_unit
-from tissuq.report.measured import noise_in_words, specimens_section
+from tissuq.report.measured import noise_in_words, noise_of_specimens, specimens_section
 
 
 @pytest.mark.parametrize(
@@ -46,9 +46,8 @@ def test_a_page_of_specimens_says_how_they_were_read_and_what_was_fitted(tmp_pat
 def test_unknown_noise_of_several_tests_is_said_to_be_in_proportion_to_their_scatter(noise):
     stretch = np.linspace(1.02, 1.4, 12)
     tests = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.01, seed=seed) for seed in (1, 2)]
-    found = {
-        count: noise_in_words(None, tq.fit(tests[:count], discrepancy="none", noise=noise, tolerances="as-tested"))
-        for count in (1, 2)
-    }
+    fits = [tq.fit(tests[:count], discrepancy="none", noise=noise, tolerances="as-tested") for count in (1, 2)]
     words = ", of several tests in the proportions in which they scatter about smooth curves"
-    assert found[2] == found[1] + words * (noise == "independent")
+    of_one, of_two = (noise_in_words(None, fit) for fit in fits)
+    assert of_two == of_one + words * (noise == "independent")
+    assert noise_of_specimens({"L1": fits[1]}, stress_unit("kPa")) == f"Noise: {of_two}."

@@ -100,7 +100,7 @@ def noise_of_specimens(fits: Mapping[str, Posterior], unit: StressUnit) -> str:
     """Return what the random errors of measurements of specimens are taken to be."""
     specimens: dict[str, list[str]] = {}
     for name, fit in fits.items():
-        noise, text = fit.model.noise, fit.model.noise.description
+        noise, text = fit.model.noise, f"{fit.model.noise.description}{_ratios_of_tests(fit.model)}"
         if not noise.parameters:
             sds = dict.fromkeys(f"{sd / unit.to_mpa:.4g}" for sd in noise.of_tests(fit.model.experiment))
             text = f"known standard deviation {', '.join(sds)} {unit.name}"
@@ -113,13 +113,18 @@ def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str
     """Return what the random errors of single measurements are taken to be."""
     noise, lag = posterior.model.noise, posterior.model.fitted_errors.lag
     if noise.parameters:
-        has_ratios = len(posterior.model.experiment.tests) > 1 and not noise.depends_on_level
-        of_tests = ", of several tests in the proportions in which they scatter about smooth curves" * has_ratios
-        return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "") + of_tests
+        of_lag = f" (lag-1 correlation {lag:.2f})" if lag else ""
+        return f"{noise.description}{of_lag}{_ratios_of_tests(posterior.model)}"
     values = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
     sizes = ", ".join(f"{value:g}" for value in values) or f"{study.settings.noise_sd:g}"
     of_means = " of single measurements, of means that over the root of their number"
     return f"sd {sizes} {study.experiment.stress_unit}{of_means * (study.experiment.averaged_at_most > 1)}"
+
+
+def _ratios_of_tests(model: StatisticalModel) -> str:
+    """Return what goes without saying of one test: in what ratios unknown noises of several are."""
+    is_told = len(model.experiment.tests) > 1 and not model.noise.depends_on_level
+    return ", of several tests in the proportions in which they scatter about smooth curves" * is_told
 
 
 def errors_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
