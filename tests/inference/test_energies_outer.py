@@ -14,7 +14,7 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.nodes import Guide
 from tissuq.inference.enumerators.outer_search import relative_error, weighted_nodes
 from tissuq.inference.linear import times_gaussians
-from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points, log_normal
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, even_points, log_normal
 from tissuq.model.noise import stress_level
 
 SKIN = Path(__file__).parents[3] / "shared" / "data" / "tissues" / "skin-porcine-p12ac1.csv"
@@ -130,6 +130,36 @@ def test_repeats_tell_the_noise_of_a_function_of_the_stretch():
     assert np.array_equal(*tables, equal_nan=True)
 
 
+def test_the_long_tail_of_one_of_two_nonlinear_parameters_is_integrated():
+    """Its 97.5 % point was at 92.5 % of the grid's mass when the sum ended with a hundred effective values."""
+    log_b, powers = np.linspace(-8, 8, 81), np.linspace(0.2, 8, 61)
+    unit, x = STRETCH - STRETCH**-2, STRETCH**2 + 2 / STRETCH - 3
+    columns = [[unit * (1 + np.exp(log) * x / power) ** (power - 1) for power in powers] for log in log_b]
+    densities = [[np.logaddexp.reduce(conditional(column, NOISE_SD, 10)[0]) for column in row] for row in columns]
+    log_density = np.array(densities) - 0.5 * (log_b[:, None] / 2) ** 2
+    priors = {"mu": tq.Uniform(0, 10), "b": tq.LogNormal(1.0, 2.0), "n": tq.Uniform(0.2, 8)}
+    solution = fit(material="knowles", noise_sd=NOISE_SD, priors=priors).solution
+    evidence = np.logaddexp.reduce(log_density, axis=None) + np.log((log_b[1] - log_b[0]) * (powers[1] - powers[0]))
+    evidence -= np.log(7.8 * 2 * np.sqrt(2 * np.pi))
+    assert solution.log_evidence == pytest.approx(evidence, abs=solution.log_evidence_error)
+    mass = np.exp(log_density - log_density.max()).sum(axis=1)
+    below = (np.cumsum(mass) - 0.5 * mass) / mass.sum()
+    probabilities = np.array([0.5, 0.9, 0.975])
+    reached = np.interp(np.log(solution.marginals["b"].quantile(probabilities)), log_b, below)
+    assert reached == pytest.approx(probabilities, abs=0.025)
+    assert reached[2] == pytest.approx(0.975, abs=0.01)
+
+
+def test_every_value_of_the_noise_has_points_of_its_own():
+    """Their errors cancel in the sum; with the same points at each they were the same."""
+    solution = tq.fit(DATA, material="knowles", discrepancy="taylor").solution
+    columns = dict(zip(solution.model.nonlinear, solution.mixture.settings.T, strict=True))
+    noise, b = columns["noise_sd"], columns["b"]
+    values = [set(b[noise == level]) for level in np.unique(noise)]
+    assert len(values) > 5
+    assert sum(map(len, values)) == len(set(b))
+
+
 @pytest.mark.parametrize(
     ("discrepancy", "material"),
     [("taylor", "ogden-1"), *(pytest.param("auto", name, marks=pytest.mark.slow) for name in ("ogden-1", "ogden-2"))],
@@ -224,6 +254,16 @@ def test_points_of_every_round_are_evenly_spread(dimension):
 
     adaptation = adapted(log_density, dimension, 64 * (dimension + 1), min_effective=50.0)
     assert adaptation.log_mass == pytest.approx(0, abs=0.35)
+
+
+def test_rounds_go_on_until_enough_points_are_effective():
+    def log_density(points):
+        return log_normal((points - 0.5) / 0.3) - 2 * np.log(0.3)
+
+    few, many = (adapted(log_density, 2, 64, min_effective=20.0, enough_effective=enough) for enough in (0.0, 400.0))
+    assert effective(few.log_weights) < 400 < effective(many.log_weights)
+    assert many.is_settled
+    assert many.log_mass == pytest.approx(0, abs=0.05)
 
 
 def test_the_proposal_is_a_normalised_density():

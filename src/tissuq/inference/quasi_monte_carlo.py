@@ -29,14 +29,14 @@ MIN_EFFECTIVE_SHARE = 0.3
 """Share of a round's points that must be effective for the adaptation to end."""
 
 
-def even_points(dimension: int, count: int) -> FloatArray:
+def even_points(dimension: int, count: int, points_taken: int = 0) -> FloatArray:
     """Return evenly spread points (count, d) of the unit cube; those of every slice of them are, too.
 
-    Of a line, every k-th of them.
+    Of a line, every k-th of them. ``points_taken`` of them, except of a line, went before.
     """
     if dimension == 1:
         return (np.arange(count)[:, None] + 0.5) / count
-    return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * _steps(dimension)) % 1.0)
+    return np.asarray((0.5 + (points_taken + np.arange(1, count + 1))[:, None] * _steps(dimension)) % 1.0)
 
 
 @lru_cache
@@ -140,6 +140,8 @@ def adapted(
     *,
     start: Proposal | None = None,
     min_effective: float | None = None,
+    enough_effective: float = 0.0,
+    points_taken: int = 0,
 ) -> Adaptation:
     """Return a proposal for a density near the standard normal or much narrower, known (N,) at points (N, d).
 
@@ -147,24 +149,25 @@ def adapted(
     the mixture of all proposals so far, give the next t distribution its mean and covariance; the power is the
     largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering). Where the rounds do
     not suffice, as on the way to a density that is far and narrow, the last proposal is the first of as many others,
-    whose points alone count. ``count`` is the number of points in a round, ``start`` the first proposal, and
+    whose points alone count. ``count`` is the number of points in a round, ``start`` the first proposal,
     ``min_effective`` how many of all points are to be effective in the end (by default a share of those of the last
-    round).
+    round), and ``enough_effective`` how many where there are rounds left. ``points_taken`` quasi-random points went to
+    similar searches before.
     """
     count = count or 16 + 16 * dimension
-    rounds = _rounds(dimension, count)
+    rounds = _rounds(dimension, count, points_taken)
     proposal, log_mass = start or Proposal(np.zeros(dimension), np.eye(dimension)), None
     for _ in range(MAX_SEARCHES):
-        adaptation = _search(log_density, rounds, proposal, min_effective, log_mass)
+        adaptation = _search(log_density, rounds, proposal, min_effective, enough_effective, log_mass)
         if adaptation.is_settled:
             break
         proposal, log_mass = adaptation.proposal, adaptation.log_mass
     return adaptation
 
 
-def _rounds(dimension: int, count: int) -> FloatArray:
+def _rounds(dimension: int, count: int, points_taken: int) -> FloatArray:
     """Return points (rounds, count, d) of the unit cube, evenly spread in each round and together."""
-    points = even_points(dimension, MAX_ROUNDS * count)
+    points = even_points(dimension, MAX_ROUNDS * count, points_taken)
     if dimension == 1:
         return points.reshape(count, MAX_ROUNDS, 1).swapaxes(0, 1)
     return points.reshape(MAX_ROUNDS, count, dimension)
@@ -175,6 +178,7 @@ def _search(
     rounds: FloatArray,
     start: Proposal,
     min_effective: float | None,
+    enough_effective: float,
     log_mass: float | None,
 ) -> Adaptation:
     """Return what the rounds of one search lead to.
@@ -202,14 +206,15 @@ def _search(
         covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
         proposal = Proposal(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
         effective_new = effective(values[-count:] - proposals[-1].log_density(new)) if power == 1 else 0.0
-        is_found = effective_new > MIN_EFFECTIVE_SHARE * count
+        is_found, number = effective_new > MIN_EFFECTIVE_SHARE * count, effective(log_weights)
         if min_effective is not None:
-            is_found = effective(log_weights) > min_effective
+            is_found = number > min_effective
         adaptation = Adaptation(proposal, points, log_weights)
         earlier, log_mass = log_mass, adaptation.log_mass
-        if is_found and (earlier is None or abs(log_mass - earlier) < MAX_CHANGE):
-            return adaptation
-    return adaptation._replace(is_settled=False)
+        is_settled = is_found and (earlier is None or abs(log_mass - earlier) < MAX_CHANGE)
+        if is_settled and number >= enough_effective:
+            break
+    return adaptation._replace(is_settled=is_settled)
 
 
 def tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:

@@ -12,7 +12,7 @@ from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.adapted_points import AdaptedPoints
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
-from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
+from tissuq.inference.enumerators.line import FINE, OF_SUM, ROUGH, Accuracy
 from tissuq.inference.enumerators.nodes import Guide
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.reduction import RememberedBases
@@ -74,9 +74,9 @@ class Solver:
             return self._error_estimates().with_probable_noise(model)
 
     def _error_estimates(self) -> ErrorEstimates:
-        similar_solver = partial(self._known_solver, ROUGH)
+        for_estimates, similar_solver = replace(self, accuracy=OF_SUM), partial(self._known_solver, ROUGH)
         return ErrorEstimates(
-            lambda model: self._solve([model])[0], self._is_integrated, self._sums_noise, similar_solver
+            lambda model: for_estimates._solve([model])[0], self._is_integrated, self._sums_noise, similar_solver
         )
 
     def _is_integrated(self, model: StatisticalModel) -> bool:
@@ -109,7 +109,7 @@ class Solver:
         """Return what solves models with known noise, similar ones that are summed."""
         lattice, points = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy)), AdaptedPoints(accuracy)
         # The first value of the noise is the least, where a ridge is thinnest: there it is seen whether any was missed.
-        cells = AdaptiveCells(accuracy == FINE, accuracy.tolerance, bases=RememberedBases())
+        cells = AdaptiveCells(accuracy == OF_SUM, accuracy.tolerance, bases=RememberedBases())
 
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
@@ -136,7 +136,7 @@ class Solver:
                 raise ModelError(f"the method '{self.method}' does not apply: {reason}.")
             return sampler
         if model.energy_symbols:
-            return AmplitudeLattice()
+            return AmplitudeLattice(guide=Guide(FINE if self.accuracy == FINE else OF_SUM))
         if (refusal := AdaptedPoints.why_not(model)) and self.method == "auto":
             return _sampler("nuts", refusal)
         return AdaptiveCells() if refusal or _suits_cells(model) else AdaptedPoints(self.accuracy)

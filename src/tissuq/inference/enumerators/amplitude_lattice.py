@@ -44,6 +44,8 @@ TOUCHED_MASS = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
 MAX_COMPONENTS = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
+MAX_MARGINAL_POINTS = 100_000
+"""Points, at most, from which marginals of linear parameters are computed."""
 MARGINAL_DIVISOR = 15
 """So many times fewer components are taken for the marginals within several bounds."""
 MARGINAL_POINTS, MARGINAL_NOISES = 1000, 400
@@ -184,8 +186,9 @@ class _EnergySums:
         self._points, self._weights = points, np.exp(masses - top) / total
         self._shares = np.bincount(self._node, self._weights, minlength=len(nodes))
         settings = self._settings(points, self._node)
-        gaussians = GaussianMixture(self._weights, settings, mean, root)
-        self._truncated = TruncatedMixture.of(gaussians, mass_outside, self._box)
+        gaussians = GaussianMixture(self._weights, settings, mean, root).resampled(MAX_MARGINAL_POINTS)
+        outside_of_few = self._box.beyond(gaussians.mean, gaussians.root)
+        self._truncated = TruncatedMixture.of(gaussians, outside_of_few, self._box)
         self._mass_outside = mass_outside.sum(axis=1)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):

@@ -42,8 +42,9 @@ class Accuracy(NamedTuple):
         Log density below the largest one at which no more places are added at the ends.
     probabilities : tuple of float
         Of places that are spread over the density.
-    min_effective : float
-        Effective number, at the least, of quasi-random points of a density of more coordinates.
+    min_effective, enough_effective : float
+        Effective number of quasi-random points of a density of more coordinates: at the least, and where no more are
+        taken.
     bounded_points : int
         Points, at most, of which masses are computed within bounds of more parameters than two.
     tolerance : float
@@ -55,12 +56,16 @@ class Accuracy(NamedTuple):
     end_drop: float
     probabilities: tuple[float, ...]
     min_effective: float
+    enough_effective: float
     bounded_points: int
     tolerance: float
 
 
-FINE = Accuracy(2.0, 0.22, 6.5, (0.001, 0.012, 0.06, 0.16, 0.32, 0.5, 0.68, 0.84, 0.94, 0.988, 0.999), 20.0, 8000, 1e-3)
-ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0, 500, 0.03)
+PROBABILITIES = (0.001, 0.012, 0.06, 0.16, 0.32, 0.5, 0.68, 0.84, 0.94, 0.988, 0.999)
+FINE = Accuracy(2.0, 0.22, 6.5, PROBABILITIES, 20.0, 200.0, 8000, 1e-3)
+OF_SUM = FINE._replace(enough_effective=20.0)
+"""For one of many posteriors that are summed, each with points of its own."""
+ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0, 6.0, 500, 0.03)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
+from tissuq.inference.enumerators.line import OF_SUM, ROUGH, Accuracy
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, blended, marginal_of_table
 from tissuq.inference.solution import Marginals, Solution
@@ -111,7 +111,7 @@ class NoiseGrid:
         low, high = (low, high) if ends[0] < high and low < ends[1] else ends
         initial = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
         nodes = _nodes(*_refined(partial(log_weight, sketch, self.known_solver(ROUGH)), initial, ends))
-        logs, log_weights = _widened(partial(log_weight, model, self.known_solver(FINE)), nodes, ends)
+        logs, log_weights = _widened(partial(log_weight, model, self.known_solver(OF_SUM)), nodes, ends)
         return _joined(model, [solutions[float(value)] for value in logs], logs, log_weights, seed)
 
 

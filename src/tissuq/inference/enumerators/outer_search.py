@@ -105,8 +105,17 @@ class _Search:
             return self._log_masses(new, points)
 
         count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
-        min_effective = guide.accuracy.min_effective
-        adaptation = adapted(log_masses, d, count, start=start, min_effective=min_effective)
+        min_effective, enough = guide.accuracy.min_effective, guide.accuracy.enough_effective
+        adaptation = adapted(
+            log_masses,
+            d,
+            count,
+            start=start,
+            min_effective=min_effective,
+            enough_effective=enough,
+            points_taken=guide.points_taken,
+        )
+        guide.points_taken += len(nodes)
         is_found = adaptation.is_settled and effective(adaptation.log_weights) >= min_effective
         if guide.proposal is not None and not is_found:
             guide.proposal, self._members = None, members
