@@ -54,7 +54,7 @@ def test_the_next_step_says_where_the_same_test_again_is_as_good(study, tmp_path
 
 def test_the_next_step_fits_what_was_fitted(study, tmp_path):
     result = design_result(study, study.settings, tmp_path / "run")
-    assert "tissuq fit DATA.csv NEW.csv --material gent --discrepancy none --mode uniaxial" in result.next_step
+    assert "DATA.csv NEW.csv --material gent --discrepancy none --noise-sd 20 --mode uniaxial" in result.next_step
 
 
 def test_a_table_beneath_the_answer_has_the_ten_best_tests_and_a_folded_one_has_all(study, tmp_path):

@@ -284,8 +284,9 @@ def distortional_energy(material: Material, values: ArrayLike | None = None) -> 
     """
     if not material.is_isotropic:
         raise ModelError(
-            f"material '{material.name}' has fibres; finite elements are available for isotropic materials only, which "
-            "depend on the principal stretches alone. For a model of your own, FElupeMaterial takes fibres."
+            f"material '{material.name}' has fibres; these finite elements take isotropic materials only, which depend "
+            "on the principal stretches alone. Cards for other programs have fibres (tissuq export RUN), and so has "
+            "tissuq.finite_elements.FElupeMaterial for a model of your own in Python."
         )
     return _matrix_and_fibres(material, values)[0]
 

@@ -73,6 +73,8 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     default = {name: SpecimenSettings.model_fields[name].default for name in ("material", "discrepancies")}
     fitted = f" --material {model.material.name}" * (model.material.name != default["material"])
     fitted += f" --discrepancy {model.discrepancy.name}" * ((model.discrepancy.name,) != default["discrepancies"])
+    sds = {f"{sd / study.unit.to_mpa:.4g}" for sd in model.noise.of_tests(model.experiment)}
+    fitted += f" --noise-sd {min(sds)}" * (len(sds) == 1 and not model.noise.parameters)
     test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=fitted + modes + errors)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
