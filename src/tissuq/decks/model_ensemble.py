@@ -213,7 +213,7 @@ def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
     """Return times (s,) and curves (N, s) on them, from pairs of times and values, None where a draw has none.
 
     Where all have the times of the longest, or those up to where they stopped, these are the common ones; else curves
-    are interpolated linearly. Where a curve has stopped it is not a number.
+    are interpolated by monotone cubics. Where a curve has stopped it is not a number.
 
     Examples
     --------
@@ -222,6 +222,8 @@ def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
     >>> times.tolist(), values.tolist()
     ([0.5, 1.0], [[2.0, 4.0], [3.0, nan], [nan, nan]])
     """
+    from scipy.interpolate import PchipInterpolator
+
     pairs = [
         None if curve is None else tuple(np.asarray(column, dtype=np.float64) for column in curve) for curve in curves
     ]
@@ -237,7 +239,9 @@ def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
         if pair is not None and len(pair[0]) and is_prefix:
             row[: len(pair[1])] = pair[1]
         elif pair is not None and len(pair[0]):
-            row[:] = np.interp(common, pair[0], pair[1], right=np.nan)
+            times, rows_of_times = np.unique(pair[0], return_index=True)
+            if len(times) > 1:
+                row[:] = PchipInterpolator(times, pair[1][rows_of_times], extrapolate=False)(common)
             row[-1] = pair[1][-1] if np.isclose(pair[0][-1], common[-1], rtol=SAME_TIME, atol=0) else np.nan
     return common, rows
 
