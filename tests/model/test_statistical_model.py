@@ -184,40 +184,48 @@ def test_a_natural_bound_is_no_cause_for_a_warning():
     assert not any("cut" in text for text in found)
 
 
-def test_auto_asks_nuts_with_the_reason_where_quadrature_does_not_reach_its_tolerance(monkeypatch):
+def fails(enumerator, models, seed):
+    raise tq.ConvergenceError("this fails")
+
+
+def fails_too(enumerator, models, seed):
+    raise tq.ConvergenceError("this fails, too")
+
+
+def test_points_serve_where_quadrature_does_not_reach_its_tolerance(monkeypatch):
+    exact = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
+    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
+    summed = tq.fit(DATA, discrepancy="constant", noise_sd=0.1, method="exact")
+    assert "a sum over" in summed.solution.reason
+    assert summed.log_evidence == pytest.approx(exact.log_evidence, abs=4 * summed.log_evidence_error)
+
+
+def test_auto_asks_nuts_with_the_first_reason_where_nothing_is_summed(monkeypatch):
     class Asked(Exception):
         pass
-
-    def fails(enumerator, models, seed):
-        raise tq.ConvergenceError("quadrature did not reach its tolerance")
 
     def asked(model, seed, refusal):
         raise Asked(refusal)
 
     monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
+    monkeypatch.setattr("tissuq.inference.enumerators.adapted_points.AdaptedPoints.solve", fails_too)
     monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_by_nuts", asked)
-    with pytest.raises(Asked, match="quadrature did not reach its tolerance"):
+    with pytest.raises(Asked, match=r"this fails$"):
         tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
 
 
 @pytest.mark.slow
-def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch):
-    def fails(enumerator, models, seed):
-        raise tq.ConvergenceError("quadrature did not reach its tolerance")
-
+def test_auto_samples_where_nothing_is_summed(monkeypatch):
     exact = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
     monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
+    monkeypatch.setattr("tissuq.inference.enumerators.adapted_points.AdaptedPoints.solve", fails_too)
     sampled = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
     assert sampled.solution.route == "nuts"
-    assert "quadrature did not reach its tolerance" in sampled.solution.reason
+    assert "this fails" in sampled.solution.reason
     assert sampled.log_evidence == pytest.approx(exact.log_evidence, abs=5 * sampled.log_evidence_error)
     assert 0 < sampled.log_evidence_error < 0.2
     with pytest.raises(tq.ConvergenceError):
         tq.fit(DATA, discrepancy="constant", noise_sd=0.1, method="exact")
-
-
-def fails(enumerator, models, seed):
-    raise tq.ConvergenceError("this fails")
 
 
 def test_auto_turns_to_samples_of_all_parameters_where_none_is_left_to_sample_alone(monkeypatch):

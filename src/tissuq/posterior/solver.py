@@ -88,22 +88,24 @@ class Solver:
         """Return whether a model is solved as a sum over values of its noise."""
         return self._is_integrated(model) and not NoiseGrid.why_not(model)
 
-    def _solve(self, models: Sequence[StatisticalModel], cells: AdaptiveCells | None = None) -> Sequence[Solution]:
-        """Solve models on the same stretches: together by one enumerator, or each by NUTS where that does not serve.
+    def _solve(self, models: Sequence[StatisticalModel], enumerators: Sequence[Enumerator] = ()) -> Sequence[Solution]:
+        """Solve models on the same stretches: together by the first enumerator that serves, or else each by itself.
 
-        Where it is cells that serve, by those given.
+        That is the first of those given, or of those for the method; where none serves it is NUTS for a single model.
         """
-        enumerator = self._enumerator(models[0])
-        if cells and isinstance(enumerator, AdaptiveCells):
-            enumerator = cells
-        try:
-            return enumerator.solve(models, self.seed)
-        except ConvergenceError as error:
-            if self.method != "auto" or models[0].energy_symbols:
-                raise
-            if len(models) > 1:
-                return [solution for model in models for solution in self._solve([model])]
-            return _sampler("nuts", str(error)).solve(models, self.seed)
+        errors = list[ConvergenceError]()
+        for enumerator in enumerators or self._enumerators(models[0]):
+            try:
+                return enumerator.solve(models, self.seed)
+            except ConvergenceError as error:
+                errors.append(error)
+                if len(models) > 1:
+                    break
+        if self.method != "auto" or models[0].energy_symbols:
+            raise errors[0]
+        if len(models) > 1:
+            return [solution for model in models for solution in self._solve([model])]
+        return _sampler("nuts", str(errors[0])).solve(models, self.seed)
 
     def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
         """Return what solves models with known noise, similar ones that are summed."""
@@ -114,14 +116,12 @@ class Solver:
         def solve_known(model: StatisticalModel) -> Solution:
             if model.energy_symbols:
                 return lattice.solve([model], self.seed)[0]
-            if not _suits_cells(model):
-                return points.solve([model], self.seed)[0]
-            return self._solve([model], cells)[0]
+            return self._solve([model], [cells, points] if _suits_cells(model) else [points])[0]
 
         return solve_known
 
-    def _enumerator(self, model: StatisticalModel) -> Enumerator:
-        """Return what enumerates the nonlinear parameters of a model by the method that was chosen.
+    def _enumerators(self, model: StatisticalModel) -> list[Enumerator]:
+        """Return what may enumerate the nonlinear parameters of a model by the method that was chosen, the best first.
 
         Raises
         ------
@@ -129,17 +129,18 @@ class Solver:
             When it does not serve this model.
         """
         if self._sums_noise(model):
-            return NoiseGrid(self._known_solver)
+            return [NoiseGrid(self._known_solver)]
         if self.method not in ("auto", "exact"):
             sampler = _sampler(self.method)
             if reason := sampler.why_not(model):
                 raise ModelError(f"the method '{self.method}' does not apply: {reason}.")
-            return sampler
+            return [sampler]
         if model.energy_symbols:
-            return AmplitudeLattice(guide=Guide(FINE if self.accuracy == FINE else OF_SUM))
-        if (refusal := AdaptedPoints.why_not(model)) and self.method == "auto":
-            return _sampler("nuts", refusal)
-        return AdaptiveCells() if refusal or _suits_cells(model) else AdaptedPoints(self.accuracy)
+            return [AmplitudeLattice(guide=Guide(FINE if self.accuracy == FINE else OF_SUM))]
+        if refusal := AdaptedPoints.why_not(model):
+            return [_sampler("nuts", refusal) if self.method == "auto" else AdaptiveCells()]
+        points = [AdaptedPoints(self.accuracy)] if model.nonlinear else []
+        return [AdaptiveCells(), *points] if _suits_cells(model) else [*points]
 
 
 def _sampler(method: Method, refusal: str = "") -> Enumerator:
