@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.candidates import candidate_named, target_named
+from tissuq.next_test.candidates import candidate_named
 from tissuq.next_test.next_test import NextTest
-from tissuq.next_test.quantities import quantity_target
+from tissuq.next_test.targets import quantity_target, target_named
 
 STRETCH = np.linspace(0.8, 1.3, 12)
 STATES = [(mode, np.array([stretch])) for mode in ("uniaxial", "planar") for stretch in (0.85, 1.1, 1.2)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.candidates import target_named
+from tissuq.next_test.targets import target_named
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,9 @@ from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import Tolerances, specimens_of
-from tissuq.next_test.candidates import Candidate, Stresses, Target, farthest_range, reach_of
+from tissuq.next_test.candidates import Candidate, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
+from tissuq.next_test.targets import Stresses, Target
 from tissuq.prediction.moments import stress_moments, stress_slopes, values_by_symbol
 
 Column = tuple[FloatArray, FloatArray]

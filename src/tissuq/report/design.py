@@ -13,8 +13,8 @@ import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
-from tissuq.next_test.candidates import Target
 from tissuq.next_test.ranking import TIED
+from tissuq.next_test.targets import Target
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import said_by
 from tissuq.report.tables import significant
