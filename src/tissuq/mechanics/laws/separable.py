@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf
 from typing import Any
 
 from tissuq.errors import ModelError
@@ -172,17 +171,13 @@ def _intervals(count: int) -> list[tuple[float, float]]:
     return list(pairwise(SMALLEST_EXPONENT * ratio ** (end / count) for end in range(count + 1))) if count else []
 
 
-def _modulus(law: str) -> tuple[Parameter]:
-    return (Parameter("mu", f"initial shear modulus of {law}", support=(0.0, inf)),)
-
-
 class ValanisLandel(StretchMaterial):
     """W = 2 mu sum over k of (l_k ln(l_k) - l_k + 1), so that w'(l) = 2 mu ln(l); initial shear modulus mu."""
 
     name = "valanis-landel"
     formula = "2 mu sum over k of (l_k ln(l_k) - l_k + 1)"
     source = "Valanis & Landel 1967"
-    parameters = _modulus("Valanis and Landel's law")
+    parameters = (Parameter.shear_modulus("Valanis and Landel's law"),)
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         return 2 * values[0] * sum(stretch * log(stretch) - stretch + 1 for stretch in stretches)
@@ -197,7 +192,7 @@ class PengLandel(StretchMaterial):
     name = "peng-landel"
     formula = "3 mu sum over k of (l_k - 1 - e - e^2/6 + e^3/18 - e^4/216), e = ln(l_k)"
     source = "Peng & Landel 1972"
-    parameters = _modulus("Peng and Landel's law")
+    parameters = (Parameter.shear_modulus("Peng and Landel's law"),)
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         logs = [log(stretch) for stretch in stretches]
@@ -210,7 +205,7 @@ class Hencky(StretchMaterial):
     name = "hencky"
     formula = "mu (ln(l1)^2 + ln(l2)^2 + ln(l3)^2)"
     source = "Hencky 1931"
-    parameters = _modulus("Hencky's law")
+    parameters = (Parameter.shear_modulus("Hencky's law"),)
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         return values[0] * sum(log(stretch) ** 2 for stretch in stretches)
