@@ -157,7 +157,7 @@ class NextTest:
 
     def _common_error(self, error: float) -> FloatArray:
         """Return the error (t,) of each target that all stresses have in common."""
-        return error * np.array([target.is_stiffness(self.model) for target in self.targets])
+        return error * np.array([target.is_stiffness for target in self.targets])
 
     @property
     def _offsets(self) -> FloatArray:

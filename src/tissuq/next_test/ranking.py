@@ -142,7 +142,7 @@ def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_reques
         rows.append(
             {
                 "target": target.name,
-                "unit": target.unit(model),
+                "unit": target.unit,
                 "candidate": candidate.name,
                 "mode": candidate.mode.name,
                 "low": float(candidate.stretch.min()),

@@ -40,36 +40,37 @@ class Stresses(NamedTuple):
     scatter: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Target(ABC):
-    """A quantity that is linear in the linear parameters, given the others."""
+    """A quantity that is linear in the linear parameters, given the others.
 
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """The name, as `target_named` reads it."""
+    Attributes
+    ----------
+    name : str
+        As `target_named` reads it.
+    title : str
+        What it is in words.
+    unit : str
+        Of its values: MPa, or nothing.
+    is_stiffness : bool
+        Whether an error of all stresses multiplies it.
+    states : tuple of (LoadingMode, float)
+        A mode and a stretch of it for each of the K engineering stresses that it is made of.
+    offset : float
+        The part of its mean that no error of all stresses multiplies.
+    """
 
-    @abstractmethod
-    def title(self, model: StatisticalModel) -> str:
-        """Return what it is in words."""
-
-    def unit(self, model: StatisticalModel) -> str:
-        """Return the unit of its values: MPa, or nothing."""
-        return "MPa"
-
-    def is_stiffness(self, model: StatisticalModel) -> bool:
-        """Return whether an error of all stresses multiplies it."""
-        return True
+    name: str
+    title: str
+    unit: str = "MPa"
+    is_stiffness: bool = True
+    states: tuple[tuple[LoadingMode, float], ...] = ()
+    offset: float = 0.0
 
     @property
     def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """A mode and a stretch (1,) of it for each of the K stresses that it is made of."""
-        return iter(())
-
-    @property
-    def offset(self) -> float:
-        """The part of its mean that no error of all stresses multiplies."""
-        return 0.0
+        """The modes and stretches (1,) of the stresses."""
+        return ((mode, np.array([stretch])) for mode, stretch in self.states)
 
     @abstractmethod
     def moments(
@@ -78,44 +79,18 @@ class Target(ABC):
         """Return means (M,) and roots (M, q) in every component, in which the stresses at its points are given."""
 
 
-@dataclass(frozen=True)
 class ParameterTarget(Target):
-    """A parameter of the model."""
-
-    symbol: str
-
-    @property
-    def name(self) -> str:
-        """Its symbol."""
-        return self.symbol
-
-    def title(self, model: StatisticalModel) -> str:
-        return self.symbol
-
-    def unit(self, model: StatisticalModel) -> str:
-        return next(p.unit for p in model.parameters if p.symbol == self.symbol)
-
-    def is_stiffness(self, model: StatisticalModel) -> bool:
-        return self.symbol in model.column_symbols
+    """A parameter of the model, by its symbol."""
 
     def moments(
         self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
     ) -> tuple[FloatArray, FloatArray]:
-        mean, root = values_of(model, components, [self.symbol])
+        mean, root = values_of(model, components, [self.name])
         return mean[:, 0], root[:, 0]
 
 
-@dataclass(frozen=True)
 class ModulusTarget(Target):
     """The material's initial shear modulus."""
-
-    @property
-    def name(self) -> str:
-        """The word for it."""
-        return MODULUS
-
-    def title(self, model: StatisticalModel) -> str:
-        return "initial shear modulus"
 
     def moments(
         self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
@@ -127,52 +102,20 @@ class ModulusTarget(Target):
 class QuantityTarget(Target):
     """A stress, discrepancy included, without noise, or a quantity of a finite-element model, which follows several.
 
-    To first order it is intercept + sum of weight_k * stress_k + an error.
+    To first order it is offset + sum of weight_k * stress_k + an error. A model's units are the user's.
 
     Attributes
     ----------
-    text, words : str
-        Its name, and what it is.
-    states : tuple of (LoadingMode, float)
-        K modes and stretches of them, whose engineering stresses it follows.
     weights : tuple of K floats, unit of the quantity / MPa
-    intercept, residual_sd : float
-        The latter of the error: that of draws which are left out of the fit.
+    residual_sd : float
+        Of the error: that of draws which are left out of the fit.
     explained : float
         Share of the quantity's variance over draws that is not error.
-    unit_of_values : str
-        Nothing for a quantity of a model, whose units are the user's.
     """
 
-    text: str
-    words: str
-    states: tuple[tuple[LoadingMode, float], ...]
-    weights: tuple[float, ...]
-    intercept: float = 0.0
+    weights: tuple[float, ...] = ()
     residual_sd: float = 0.0
     explained: float = 1.0
-    unit_of_values: str = ""
-
-    @property
-    def name(self) -> str:
-        """As it was asked for."""
-        return self.text
-
-    def title(self, model: StatisticalModel) -> str:
-        return self.words
-
-    def unit(self, model: StatisticalModel) -> str:
-        return self.unit_of_values
-
-    @property
-    def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """The modes and stretches (1,) of the stresses."""
-        return ((mode, np.array([stretch])) for mode, stretch in self.states)
-
-    @property
-    def offset(self) -> float:
-        """The intercept."""
-        return self.intercept
 
     def moments(
         self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
@@ -180,7 +123,7 @@ class QuantityTarget(Target):
         weights = np.array(self.weights)
         error = np.hypot(stresses.scatter * np.linalg.norm(weights), self.residual_sd)
         root = np.einsum("mkr,k->mr", stresses.root, weights)
-        return self.intercept + stresses.mean @ weights, np.concatenate([root, error[:, None]], axis=1)
+        return self.offset + stresses.mean @ weights, np.concatenate([root, error[:, None]], axis=1)
 
 
 def target_named(text: str | Target, model: StatisticalModel) -> Target:
@@ -196,10 +139,11 @@ def target_named(text: str | Target, model: StatisticalModel) -> Target:
     if text in model.symbols:
         if text in model.energy_symbols and not model.priors[text].has_moments:
             raise InputError(f"{text} has no standard deviation under its prior {model.priors[text]}: choose another.")
-        return ParameterTarget(text)
+        unit = next(parameter.unit for parameter in model.parameters if parameter.symbol == text)
+        return ParameterTarget(text, text, unit, text in model.column_symbols)
     name, colon, stretch = text.partition(":")
     if text == MODULUS:
-        return ModulusTarget()
+        return ModulusTarget(MODULUS, "initial shear modulus")
     if not colon:
         raise InputError(
             f"there is no target '{text}': write {MODULUS}, a parameter ({', '.join(model.symbols)}), or a stress as "
@@ -215,8 +159,8 @@ def target_named(text: str | Target, model: StatisticalModel) -> Target:
             f"target '{text}': '{stretch}' is not a stretch; write MODE:STRETCH, such as planar:1.5."
         ) from None
     point = float(checked_points(mode, [value])[0])
-    words = f"{mode.name} stress at {point:g}"
-    return QuantityTarget(f"{mode.name}:{point:g}", words, ((mode, point),), (1.0,), unit_of_values="MPa")
+    title = f"{mode.name} stress at {point:g}"
+    return QuantityTarget(f"{mode.name}:{point:g}", title, states=((mode, point),), weights=(1.0,))
 
 
 def quantity_target(
@@ -266,4 +210,6 @@ def quantity_target(
     intercept, error = float(centre - stresses.mean(axis=0) @ weights), errors[used - 1]
     explained = max(0.0, 1 - error / float(values.var()))
     of_modes = tuple((loading_mode(mode), float(stretch)) for mode, (stretch,) in states)
-    return QuantityTarget(text, words, of_modes, tuple(weights.tolist()), intercept, float(np.sqrt(error)), explained)
+    return QuantityTarget(
+        text, words, "", True, of_modes, intercept, tuple(weights.tolist()), float(np.sqrt(error)), explained
+    )

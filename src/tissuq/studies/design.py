@@ -88,7 +88,7 @@ class DesignStudy:
         """Warnings about the numbers in the table."""
         inaccurate = "Numbers marked rough are not reliable: few components of the posterior would remain."
         unexplained = [
-            f"{target.words}: the stresses of the material within the measured strains explain "
+            f"{target.title}: the stresses of the material within the measured strains explain "
             f"{100 * target.explained:.0f} % of its variance over the draws of the ensemble. The rest (strains beyond, "
             "other materials, what is not linear) stays in every expected sd."
             for target in self.targets
