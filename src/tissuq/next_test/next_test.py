@@ -88,8 +88,8 @@ class NextTest:
         self.specimen: Specimen = specimen or ("other" if self.model.tolerances else "same")
         _check_model(self.model, self.specimen)
         for target in targets:
-            for mode, points in target.points:
-                self._check_candidate(Candidate(mode, points), f"target '{target.name}'")
+            for mode, stretch in target.states:
+                self._check_candidate(Candidate(mode, [stretch]), f"target '{target.name}'")
 
     def expected(self, candidate: Candidate) -> Expected:
         """Return the expectation for a candidate.
@@ -187,7 +187,8 @@ class NextTest:
     def _stresses(self, components: GaussianMixture, tests: list[tuple[Candidate, FloatArray]]) -> Column:
         """Return means and roots of the stresses of tests at points of them, and of the targets that are stresses."""
         points_of_modes = [(test.mode, points) for test, points in tests]
-        points_of_modes += [mode_and_points for target in self.targets for mode_and_points in target.points]
+        states = [state for target in self.targets for state in target.states]
+        points_of_modes += [(mode, np.array([stretch])) for mode, stretch in states]
         if not points_of_modes:
             return np.zeros((len(components.weights), 0)), np.zeros(
                 (len(components.weights), 0, components.root.shape[2])
@@ -197,9 +198,9 @@ class NextTest:
     def _targets(self, components: GaussianMixture, mean: FloatArray, root: FloatArray) -> Column:
         """Return means (M, t) and roots (M, t, r) of the targets; stresses among them are the last ones given."""
         scatter, columns = _scatter(self.model, components), []
-        start = mean.shape[1] - sum(1 for target in self.targets for _ in target.points)
+        start = mean.shape[1] - sum(len(target.states) for target in self.targets)
         for target in self.targets:
-            end = start + sum(1 for _ in target.points)
+            end = start + len(target.states)
             stresses = Stresses(mean[:, start:end], root[:, start:end], scatter)
             target_mean, known_root = target.moments(self.model, components, stresses)
             target_root = np.zeros((len(mean), root.shape[2] + 1))

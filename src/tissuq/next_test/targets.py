@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -67,16 +67,11 @@ class Target(ABC):
     states: tuple[tuple[LoadingMode, float], ...] = ()
     offset: float = 0.0
 
-    @property
-    def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """The modes and stretches (1,) of the stresses."""
-        return ((mode, np.array([stretch])) for mode, stretch in self.states)
-
     @abstractmethod
     def moments(
         self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
     ) -> tuple[FloatArray, FloatArray]:
-        """Return means (M,) and roots (M, q) in every component, in which the stresses at its points are given."""
+        """Return means (M,) and roots (M, q) in every component, in which the stresses at its states are given."""
 
 
 class ParameterTarget(Target):
