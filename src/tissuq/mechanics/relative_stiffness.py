@@ -33,8 +33,8 @@ class RelativeStiffness(Material):
     is_isotropic = False
 
     def __post_init__(self) -> None:
-        for attribute in ("name", "formula", "source", "caution", "felt_axes"):
-            object.__setattr__(self, attribute, getattr(self.material, attribute))
+        said = ("name", "formula", "source", "caution", "felt_axes")
+        self._describe(**{attribute: getattr(self.material, attribute) for attribute in said})
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]

@@ -140,29 +140,18 @@ class Ogden(_Ogden):
     def __post_init__(self) -> None:
         if not 1 <= self.terms <= MAX_TERMS:
             raise ModelError(f"an Ogden material has 1 to {MAX_TERMS} terms, not {self.terms}.")
+        negative = [(-high, -low) for low, high in _intervals(self.terms // 2)]
+        self._describe(
+            name=f"ogden-{self.terms}",
+            formula=Ogden3.formula.replace("1 to 3", f"1 to {self.terms}"),
+            parameters=_moduli_and_exponents(*_intervals(self.terms - self.terms // 2), *negative),
+        )
 
     @classmethod
     def named(cls, name: str) -> _Ogden | None:
         """Return the material of a name such as ``ogden-4``; None for other names, and for those with own classes."""
         match = re.fullmatch(r"ogden-(\d+)", name)
         return cls(int(match[1][:9])) if match and not 1 <= int(match[1][:9]) <= 3 else None
-
-    @property
-    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """The name by which it is found."""
-        return f"ogden-{self.terms}"
-
-    @property
-    def formula(self) -> str:  # type: ignore[override]
-        """The sum of its terms."""
-        return Ogden3.formula.replace("1 to 3", f"1 to {self.terms}")
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        """Moduli, then exponents."""
-        positive = _intervals(self.terms - self.terms // 2)
-        negative = [(-high, -low) for low, high in _intervals(self.terms // 2)]
-        return _moduli_and_exponents(*positive, *negative)
 
 
 def _intervals(count: int) -> list[tuple[float, float]]:
