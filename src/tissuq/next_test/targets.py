@@ -16,6 +16,7 @@ from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.next_test.candidates import Candidate
 from tissuq.prediction.moments import values_of
 
 MODULUS = "modulus"
@@ -182,7 +183,7 @@ def quantity_target(
     Raises
     ------
     InputError
-        When few draws have a value, or all have the same.
+        When few draws have a value, or all have the same, or a mode has several controls.
     """
     is_present = np.isfinite(values)
     stresses, values = stresses[is_present], values[is_present]
@@ -204,7 +205,8 @@ def quantity_target(
     weights = right_vectors[:used].T @ (scores[:used] / singular[:used])
     intercept, error = float(centre - stresses.mean(axis=0) @ weights), errors[used - 1]
     explained = max(0.0, 1 - error / float(values.var()))
-    of_modes = tuple((loading_mode(mode), float(stretch)) for mode, (stretch,) in states)
+    tests = [Candidate(mode, stretch) for mode, stretch in states]
+    of_modes = tuple((test.mode, test.stretch.item()) for test in tests)
     return QuantityTarget(
         text, words, "", True, of_modes, intercept, tuple(weights.tolist()), float(np.sqrt(error)), explained
     )
