@@ -21,7 +21,7 @@ from tissuq.model.tolerances import Tolerances, specimens_of
 from tissuq.next_test.candidates import Candidate, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
 from tissuq.next_test.targets import Stresses, Target
-from tissuq.prediction.moments import stress_moments, stress_slopes, values_by_symbol
+from tissuq.prediction.moments import slopes_of, stress_moments, values_by_symbol
 
 Column = tuple[FloatArray, FloatArray]
 
@@ -236,7 +236,7 @@ class NextTest:
             return ErrorPoints(candidate.mode, points, curve)
         states = states_of(self.model, [(candidate.mode, points)])
         mean, _ = stress_moments(self.model, components, states)
-        slopes = stress_slopes(self.model, components, states, mean)
+        slopes = slopes_of(lambda moved: stress_moments(self.model, components, moved)[0], states, mean)
         weights = components.weights / components.weights.sum()
         return ErrorPoints(candidate.mode, points, curve, np.einsum("m,mgc->gc", weights, slopes))
 
