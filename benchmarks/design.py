@@ -18,9 +18,10 @@ import numpy as np
 import tissuq as tq
 from tissuq.assessment.modulus import modulus
 from tissuq.inference.quasi_monte_carlo import systematic
-from tissuq.next_test.candidates import reach_of, target_named
+from tissuq.next_test.candidates import reach_of
 from tissuq.next_test.expected_variance import joint_stresses, states_of
 from tissuq.next_test.next_test import NextTest
+from tissuq.next_test.targets import target_named
 
 TRUTH = {"C10": 0.5, "C20": 0.05, "C30": 0.0}
 STRETCH = np.linspace(0.75, 1.5, 20)

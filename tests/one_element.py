@@ -61,8 +61,8 @@ def calculix(card: str, loads: list[Load], folder, orientation: str = "") -> lis
     ]
 
 
-def reference(energy: Callable, bulk: float, load: Load) -> float:
-    """Return the same stress from an energy of principal stretches of product one."""
+def reference(energy: Callable, bulk: float, load: Load, axis_of_stress: int = 0) -> float:
+    """Return the same stress, or that on another axis, from an energy of principal stretches of product one."""
     if load[0] == SHEAR:
         amount = load[1]
         total = np.sqrt(1 + (amount / 2) ** 2)  # at constant volume, where U plays no part
@@ -90,11 +90,11 @@ def reference(energy: Callable, bulk: float, load: Load) -> float:
         return stretches
 
     if not free:
-        return float(gradient(placed(np.zeros(0)))[0])
+        return float(gradient(placed(np.zeros(0)))[axis_of_stress])
     start = np.prod([each for each in load if each is not FREE]) ** (-1 / len(free))
     found = root(lambda values: gradient(placed(values))[free], np.full(len(free), start), tol=1e-13)
     assert np.abs(gradient(placed(found.x))[free]).max() < 1e-8 * bulk
-    return float(gradient(placed(found.x))[0])
+    return float(gradient(placed(found.x))[axis_of_stress])
 
 
 def _displacements(load: Load) -> list[tuple[int, int, float]]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.candidates import target_named
 from tissuq.next_test.next_test import NextTest
+from tissuq.next_test.targets import target_named
 from tissuq.prediction.moments import drawn_curves
 
 STRETCH = np.array([0.75, 0.85, 0.95, 1.1, 1.25, 1.4])

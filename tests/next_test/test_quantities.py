@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.candidates import candidate_named, target_named
+from tissuq.next_test.candidates import candidate_named
 from tissuq.next_test.next_test import NextTest
-from tissuq.next_test.quantities import quantity_target
+from tissuq.next_test.targets import quantity_target, target_named
 
 STRETCH = np.linspace(0.8, 1.3, 12)
 STATES = [(mode, np.array([stretch])) for mode in ("uniaxial", "planar") for stretch in (0.85, 1.1, 1.2)]
@@ -86,3 +86,8 @@ def _rows(mode, stretch):
 def test_too_few_different_draws_are_refused(draws, values, words):
     with pytest.raises(tq.InputError, match=words):
         quantity_target("ensemble:runs/e:force", "a force", STATES, draws[0], values)
+
+
+def test_a_stress_of_a_mode_with_several_controls_is_refused(draws):
+    with pytest.raises(tq.InputError, match="'biaxial' sets 2 controls"):
+        quantity_target("q", "a force", [("biaxial", np.array([[1.1, 1.0]])), *STATES[1:]], draws[0], draws[1])

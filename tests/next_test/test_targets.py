@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.candidates import target_named
+from tissuq.next_test.targets import target_named
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +28,8 @@ def model():
 )
 def test_a_text_names_a_target(model, text, title, unit, is_stiffness):
     target = target_named(text, model)
-    assert (target.name, target.title(model), target.unit(model)) == (text, title, unit)
-    assert target.is_stiffness(model) == is_stiffness
+    assert (target.name, target.title, target.unit) == (text, title, unit)
+    assert target.is_stiffness == is_stiffness
 
 
 @pytest.mark.parametrize(

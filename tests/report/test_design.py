@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.candidates import target_named
+from tissuq.next_test.targets import target_named
 from tissuq.report.design import _best, design_figure, design_result, design_table
 from tissuq.report.result import Result, Table
 from tissuq.report.writer import write_result

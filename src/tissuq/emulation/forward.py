@@ -319,9 +319,7 @@ class UmbridgeForward(Forward):
     def identity(self) -> str:
         return f"{self.model} at {self.url}"
 
-    @property
-    def name(self) -> str:
-        return f"{self.model} at {self.url}"
+    name = identity
 
     def check(self, symbols: Sequence[str]) -> None:
         _, sizes = _client(self.url, self.model)

@@ -26,8 +26,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Solver
 
 if TYPE_CHECKING:
-    from tissuq.emulation.problem import Problem
-    from tissuq.emulation.sampling import SampledPosterior
+    from tissuq.emulation.calibration import Calibration
 
 POINTS = 20
 """Number of stretches that stand for the range."""
@@ -38,35 +37,16 @@ CALIBRATION = "calibration"
 
 
 def material_posterior(
-    problem: Problem,
-    sampled: SampledPosterior,
-    material: str | Material,
-    stretch: tuple[float, float],
-    *,
-    mode: str,
-    unit: str,
-    runs: int,
-    seed: int,
+    calibration: Calibration, material: str | Material, stretch: tuple[float, float], *, mode: str, unit: str
 ) -> Posterior:
     """Return the draws of a calibration as the posterior of a material, as `Calibration.posterior_of` says.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was calibrated.
-    sampled : SampledPosterior
-        The draws of its parameters.
-    material, stretch, mode, unit
-        As of `Calibration.posterior_of`.
-    runs : int
-        Of the forward model.
-    seed : int
 
     Raises
     ------
     InputError
         When a parameter of the material was not calibrated, or has a prior beyond its support, or the range is none.
     """
+    problem, sampled = calibration.problem, calibration.posterior
     law, priors = check_material(material, problem.forward_priors, unit)
     loading, factor = loading_mode(mode), stress_unit(unit).to_mpa
     symbols = list(priors)
@@ -91,15 +71,15 @@ def material_posterior(
         model,
         CALIBRATION,
         f"the parameters of a forward model that was calibrated on {len(problem.measured)} measurements "
-        f"through an emulator of {runs} runs",
+        f"through an emulator of {len(calibration.runs)} runs",
         lambda: mixture,
         Marginals.of(model, lambda symbol: marginals[symbol]),
-        seed=seed,
+        seed=calibration.seed,
         sampled=linear.reshape(chains, count, -1),
         diagnostics=Diagnostics(sampled.converged, sampled.verdict, rhat, ess, ess),
         is_of_data=False,
     )
-    return Posterior(solution, Solver(seed=seed))
+    return Posterior(solution, Solver(seed=calibration.seed))
 
 
 def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float, float], mode: str) -> Ensemble:

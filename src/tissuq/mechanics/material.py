@@ -52,6 +52,11 @@ class Material(ABC):
     shears: ClassVar[bool] = False
     """Whether it would shear where it is pulled along an axis of the test with free sides."""
 
+    def _describe(self, **said: Any) -> None:
+        """Say of an object what is not said of its class."""
+        for attribute, value in said.items():
+            object.__setattr__(self, attribute, value)
+
     def __add__(self, material: Material) -> Material:
         return MaterialSum.of(self, material)
 
@@ -142,6 +147,26 @@ class MaterialSum(Material):
         return cls(tuple(chain.from_iterable(nested)))
 
     def __post_init__(self) -> None:
+        joined = "+".join(material.name for material in self.summands)
+        symbols = [parameter.symbol for material in self.summands for parameter in material.parameters]
+        of_sum = "The initial shear modulus is the sum of those of the parts."
+        self._describe(
+            name=next((name for name, summands in SUMS.items() if summands == joined), joined),
+            formula=" + ".join(material.formula for material in self.summands),
+            source="; ".join(material.source for material in self.summands),
+            caution=" ".join([*(material.caution for material in self.summands if material.caution), of_sum]),
+            is_isotropic=all(material.is_isotropic for material in self.summands),
+            needs_matrix=all(material.needs_matrix for material in self.summands),
+            felt_axes=axes_felt_by(self.summands),
+            shears=any(material.shears for material in self.summands),
+            parameters=tuple(
+                replace(parameter, symbol=f"{parameter.symbol}_{number}")
+                if symbols.count(parameter.symbol) > 1
+                else parameter
+                for number, material in enumerate(self.summands, start=1)
+                for parameter in material.parameters
+            ),
+        )
         for material, later in combinations(self.summands, 2):
             shared = [parameter.symbol for parameter in material.parameters if parameter in later.parameters]
             if shared:
@@ -150,60 +175,6 @@ class MaterialSum(Material):
                     f"'{later.name}'. Leave one of them out, or write the sum as a material of your own in which "
                     "their symbols differ."
                 )
-
-    @property
-    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """The names of its summands, joined; of a sum that has a name in the literature, that name."""
-        joined = "+".join(material.name for material in self.summands)
-        return next((name for name, summands in SUMS.items() if summands == joined), joined)
-
-    @property
-    def formula(self) -> str:  # type: ignore[override]
-        """The formulas of its summands, joined."""
-        return " + ".join(material.formula for material in self.summands)
-
-    @property
-    def source(self) -> str:  # type: ignore[override]
-        """The sources of its summands, joined."""
-        return "; ".join(material.source for material in self.summands)
-
-    @property
-    def caution(self) -> str:  # type: ignore[override]
-        """The cautions of its summands, and what the sum adds."""
-        of_sum = "The initial shear modulus is the sum of those of the parts."
-        return " ".join([*(material.caution for material in self.summands if material.caution), of_sum])
-
-    @property
-    def is_isotropic(self) -> bool:  # type: ignore[override]
-        """Whether all summands are."""
-        return all(material.is_isotropic for material in self.summands)
-
-    @property
-    def needs_matrix(self) -> bool:  # type: ignore[override]
-        """Whether all summands do."""
-        return all(material.needs_matrix for material in self.summands)
-
-    @property
-    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The axes that some summand feels."""
-        return axes_felt_by(self.summands)
-
-    @property
-    def shears(self) -> bool:  # type: ignore[override]
-        """Whether some summand does."""
-        return any(material.shears for material in self.summands)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        """The parameters of its summands."""
-        symbols = [parameter.symbol for material in self.summands for parameter in material.parameters]
-        return tuple(
-            replace(parameter, symbol=f"{parameter.symbol}_{number}")
-            if symbols.count(parameter.symbol) > 1
-            else parameter
-            for number, material in enumerate(self.summands, start=1)
-            for parameter in material.parameters
-        )
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         return sum(material.strain_energy(I1, I2, share) for material, share in self.shares(values))

@@ -21,7 +21,7 @@ class RelativeStiffness(Material):
     """A sum in which one stiffness is that of the matrix, and those of the fibres are multiples of it.
 
     The lateral stretch of a uniaxial test depends on the ratios of the stiffnesses, so that the stress is proportional
-    to one of them where the others are given as multiples of it.
+    to one of them where the others are given as multiples of it. What is said of it is what is said of the sum.
 
     Parameters
     ----------
@@ -30,32 +30,11 @@ class RelativeStiffness(Material):
 
     material: MaterialSum
 
-    @property
-    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """That of the sum."""
-        return self.material.name
-
-    @property
-    def formula(self) -> str:  # type: ignore[override]
-        """That of the sum."""
-        return self.material.formula
-
-    @property
-    def source(self) -> str:  # type: ignore[override]
-        """That of the sum."""
-        return self.material.source
-
-    @property
-    def caution(self) -> str:  # type: ignore[override]
-        """That of the sum."""
-        return self.material.caution
-
     is_isotropic = False
 
-    @property
-    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Those of the sum."""
-        return self.material.felt_axes
+    def __post_init__(self) -> None:
+        said = ("name", "formula", "source", "caution", "felt_axes")
+        self._describe(**{attribute: getattr(self.material, attribute) for attribute in said})
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]

@@ -82,41 +82,30 @@ class FunctionLaw(Material):
     function: Callable[..., Any]
 
     def __post_init__(self) -> None:
-        names = tuple(inspect.signature(self.function).parameters)
+        name, names = self.function.__name__, tuple(inspect.signature(self.function).parameters)
         if not any(names[: len(start)] == start and len(names) > len(start) for start in ARGUMENTS):
-            raise InputError(f"the law '{self.name}' has the arguments {', '.join(names) or 'none'}. {HOW_TO_WRITE}.")
+            raise InputError(f"the law '{name}' has the arguments {', '.join(names) or 'none'}. {HOW_TO_WRITE}.")
         for argument in self._parameter_arguments:
             is_named = argument.kind is argument.POSITIONAL_OR_KEYWORD
             if not is_named or not (argument.default is argument.empty or isinstance(argument.default, Prior)):
                 raise InputError(
-                    f"the law '{self.name}': its argument '{argument}' is not plain, nor has it a prior. "
-                    f"{HOW_TO_WRITE}."
+                    f"the law '{name}': its argument '{argument}' is not plain, nor has it a prior. {HOW_TO_WRITE}."
                 )
+        self._describe(
+            name=name,
+            formula=(inspect.getdoc(self.function) or "W, see its function").splitlines()[0],
+            parameters=tuple(
+                Parameter(argument.name, f"parameter of {name}")
+                if (prior := argument.default) is argument.empty
+                else Parameter(argument.name, f"parameter of {name}", "number", prior.support, False, prior)
+                for argument in self._parameter_arguments
+            ),
+        )
 
     @property
-    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """The name of the function."""
-        return self.function.__name__
-
-    @property
-    def formula(self) -> str:  # type: ignore[override]
-        """The first line of its documentation."""
-        return (inspect.getdoc(self.function) or "W, see its function").splitlines()[0]
-
-    @property
-    def source(self) -> str:  # type: ignore[override]
+    def source(self) -> str:  # type: ignore[override]  # of the object, not the class
         """The file of the function."""
         return Path(self.function.__code__.co_filename).name
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        """The further arguments of the function."""
-        return tuple(
-            Parameter(argument.name, f"parameter of {self.name}")
-            if (prior := argument.default) is argument.empty
-            else Parameter(argument.name, f"parameter of {self.name}", "number", prior.support, False, prior)
-            for argument in self._parameter_arguments
-        )
 
     @property
     def _is_of_invariants(self) -> bool:

@@ -1,26 +1,20 @@
-"""What a next test may be, and what it is for: candidates to measure, and the targets to learn of."""
+"""What a next test may be: candidates to measure."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.arrays import FloatArray
-from tissuq.assessment.modulus import modulus_moments
 from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import check_no_percent, checked_points
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
-from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch, invariants, largest_invariants
-from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import values_of
 
 MIN_POINTS, MAX_POINTS = 10, 40
 """Smallest and largest number of measurements of a default candidate, which otherwise has as many as the data."""
@@ -192,164 +186,3 @@ def _even_points(mode: LoadingMode, low: float, high: float, count: int) -> Floa
 
 def _why_not(material: Material, mode: LoadingMode) -> str:
     return material.why_not(mode.path.moved(mode.excursion([0.01]), 0.0))
-
-
-MODULUS = "modulus"
-
-
-class Stresses(NamedTuple):
-    """K stresses in M components.
-
-    Attributes
-    ----------
-    mean, root : (M, K) and (M, K, r) arrays
-    scatter : (M,) array
-        Standard deviation of what is independent from stress to stress.
-    """
-
-    mean: FloatArray
-    root: FloatArray
-    scatter: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Target(ABC):
-    """A quantity that is linear in the linear parameters, given the others."""
-
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """The name, as `target_named` reads it."""
-
-    @abstractmethod
-    def title(self, model: StatisticalModel) -> str:
-        """Return what it is in words."""
-
-    def unit(self, model: StatisticalModel) -> str:
-        """Return the unit of its values: MPa, or nothing."""
-        return "MPa"
-
-    def is_stiffness(self, model: StatisticalModel) -> bool:
-        """Return whether an error of all stresses multiplies it."""
-        return True
-
-    @property
-    def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """A mode and a stretch (1,) of it for each of the K stresses that it is made of."""
-        return iter(())
-
-    @property
-    def offset(self) -> float:
-        """The part of its mean that no error of all stresses multiplies."""
-        return 0.0
-
-    @abstractmethod
-    def moments(
-        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return means (M,) and roots (M, q) in every component, in which the stresses at its points are given."""
-
-
-@dataclass(frozen=True)
-class ParameterTarget(Target):
-    """A parameter of the model."""
-
-    symbol: str
-
-    @property
-    def name(self) -> str:
-        """Its symbol."""
-        return self.symbol
-
-    def title(self, model: StatisticalModel) -> str:
-        return self.symbol
-
-    def unit(self, model: StatisticalModel) -> str:
-        return next(p.unit for p in model.parameters if p.symbol == self.symbol)
-
-    def is_stiffness(self, model: StatisticalModel) -> bool:
-        return self.symbol in model.column_symbols
-
-    def moments(
-        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
-    ) -> tuple[FloatArray, FloatArray]:
-        mean, root = values_of(model, components, [self.symbol])
-        return mean[:, 0], root[:, 0]
-
-
-@dataclass(frozen=True)
-class ModulusTarget(Target):
-    """The material's initial shear modulus."""
-
-    @property
-    def name(self) -> str:
-        """The word for it."""
-        return MODULUS
-
-    def title(self, model: StatisticalModel) -> str:
-        return "initial shear modulus"
-
-    def moments(
-        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
-    ) -> tuple[FloatArray, FloatArray]:
-        return modulus_moments(model, components)
-
-
-@dataclass(frozen=True)
-class StressTarget(Target):
-    """The engineering stress at a stretch of a mode, discrepancy included, without noise."""
-
-    mode: LoadingMode
-    stretch: float
-
-    @property
-    def name(self) -> str:
-        """Mode and stretch."""
-        return f"{self.mode.name}:{self.stretch:g}"
-
-    def title(self, model: StatisticalModel) -> str:
-        return f"{self.mode.name} stress at {self.stretch:g}"
-
-    @property
-    def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """The mode, and the stretch."""
-        yield self.mode, np.array([self.stretch])
-
-    def moments(
-        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
-    ) -> tuple[FloatArray, FloatArray]:
-        return stresses.mean[:, 0], np.concatenate([stresses.root[:, 0], stresses.scatter[:, None]], axis=1)
-
-
-def target_named(text: str | Target, model: StatisticalModel) -> Target:
-    """Return the target of a text: a parameter, ``modulus``, or a stress such as ``planar:1.5``.
-
-    Raises
-    ------
-    InputError, ModelError
-        When there is no such parameter or mode, or a parameter has no standard deviation.
-    """
-    if isinstance(text, Target):
-        return text
-    if text in model.symbols:
-        if text in model.energy_symbols and not model.priors[text].has_moments:
-            raise InputError(f"{text} has no standard deviation under its prior {model.priors[text]}: choose another.")
-        return ParameterTarget(text)
-    name, colon, stretch = text.partition(":")
-    if text == MODULUS:
-        return ModulusTarget()
-    if not colon:
-        raise InputError(
-            f"there is no target '{text}': write {MODULUS}, a parameter ({', '.join(model.symbols)}), or a stress as "
-            "MODE:STRETCH, such as planar:1.5."
-        )
-    mode = loading_mode(name.strip())
-    if len(mode.controls) > 1 or len(mode.stresses) > 1:
-        raise InputError(f"target '{text}': mode '{mode.name}' has several controls or stresses; choose one with one.")
-    try:
-        value = float(stretch)
-    except ValueError:
-        raise InputError(
-            f"target '{text}': '{stretch}' is not a stretch; write MODE:STRETCH, such as planar:1.5."
-        ) from None
-    return StressTarget(mode, float(checked_points(mode, [value])[0]))

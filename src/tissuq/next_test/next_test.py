@@ -18,9 +18,10 @@ from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import Tolerances, specimens_of
-from tissuq.next_test.candidates import Candidate, Stresses, Target, farthest_range, reach_of
+from tissuq.next_test.candidates import Candidate, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
-from tissuq.prediction.moments import stress_moments, stress_slopes, values_by_symbol
+from tissuq.next_test.targets import Stresses, Target
+from tissuq.prediction.moments import slopes_of, stress_moments, values_by_symbol
 
 Column = tuple[FloatArray, FloatArray]
 
@@ -87,8 +88,8 @@ class NextTest:
         self.specimen: Specimen = specimen or ("other" if self.model.tolerances else "same")
         _check_model(self.model, self.specimen)
         for target in targets:
-            for mode, points in target.points:
-                self._check_candidate(Candidate(mode, points), f"target '{target.name}'")
+            for mode, stretch in target.states:
+                self._check_candidate(Candidate(mode, [stretch]), f"target '{target.name}'")
 
     def expected(self, candidate: Candidate) -> Expected:
         """Return the expectation for a candidate.
@@ -156,7 +157,7 @@ class NextTest:
 
     def _common_error(self, error: float) -> FloatArray:
         """Return the error (t,) of each target that all stresses have in common."""
-        return error * np.array([target.is_stiffness(self.model) for target in self.targets])
+        return error * np.array([target.is_stiffness for target in self.targets])
 
     @property
     def _offsets(self) -> FloatArray:
@@ -186,7 +187,8 @@ class NextTest:
     def _stresses(self, components: GaussianMixture, tests: list[tuple[Candidate, FloatArray]]) -> Column:
         """Return means and roots of the stresses of tests at points of them, and of the targets that are stresses."""
         points_of_modes = [(test.mode, points) for test, points in tests]
-        points_of_modes += [mode_and_points for target in self.targets for mode_and_points in target.points]
+        states = [state for target in self.targets for state in target.states]
+        points_of_modes += [(mode, np.array([stretch])) for mode, stretch in states]
         if not points_of_modes:
             return np.zeros((len(components.weights), 0)), np.zeros(
                 (len(components.weights), 0, components.root.shape[2])
@@ -196,9 +198,9 @@ class NextTest:
     def _targets(self, components: GaussianMixture, mean: FloatArray, root: FloatArray) -> Column:
         """Return means (M, t) and roots (M, t, r) of the targets; stresses among them are the last ones given."""
         scatter, columns = _scatter(self.model, components), []
-        start = mean.shape[1] - sum(1 for target in self.targets for _ in target.points)
+        start = mean.shape[1] - sum(len(target.states) for target in self.targets)
         for target in self.targets:
-            end = start + sum(1 for _ in target.points)
+            end = start + len(target.states)
             stresses = Stresses(mean[:, start:end], root[:, start:end], scatter)
             target_mean, known_root = target.moments(self.model, components, stresses)
             target_root = np.zeros((len(mean), root.shape[2] + 1))
@@ -234,7 +236,7 @@ class NextTest:
             return ErrorPoints(candidate.mode, points, curve)
         states = states_of(self.model, [(candidate.mode, points)])
         mean, _ = stress_moments(self.model, components, states)
-        slopes = stress_slopes(self.model, components, states, mean)
+        slopes = slopes_of(lambda moved: stress_moments(self.model, components, moved)[0], states, mean)
         weights = components.weights / components.weights.sum()
         return ErrorPoints(candidate.mode, points, curve, np.einsum("m,mgc->gc", weights, slopes))
 

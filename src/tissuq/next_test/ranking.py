@@ -11,15 +11,9 @@ import numpy as np
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, measured_states, stability
 from tissuq.errors import InputError, ModelError
 from tissuq.inference.solution import Solution
-from tissuq.next_test.candidates import (
-    MODULUS,
-    Candidate,
-    Target,
-    candidate_named,
-    default_candidates,
-    target_named,
-)
+from tissuq.next_test.candidates import Candidate, candidate_named, default_candidates
 from tissuq.next_test.next_test import NextTest, Specimen
+from tissuq.next_test.targets import MODULUS, Target, target_named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,7 +142,7 @@ def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_reques
         rows.append(
             {
                 "target": target.name,
-                "unit": target.unit(model),
+                "unit": target.unit,
                 "candidate": candidate.name,
                 "mode": candidate.mode.name,
                 "low": float(candidate.stretch.min()),

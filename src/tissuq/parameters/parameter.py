@@ -49,3 +49,8 @@ class Parameter:
     def scale(cls, symbol: str, description: str) -> Parameter:
         """Return a positive parameter that sets the size of a random error in stress."""
         return cls(symbol, description, "stress", (0.0, inf), False, Uniform(0.0, 1.0))
+
+    @classmethod
+    def shear_modulus(cls, law: str) -> Parameter:
+        """Return the initial shear modulus of a law."""
+        return cls("mu", f"initial shear modulus of {law}", support=(0.0, inf))

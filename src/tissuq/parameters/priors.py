@@ -210,10 +210,7 @@ class HalfNormal(Prior):
 
     name = "half-normal"
     with_unit = ("sd",)
-
-    @property
-    def support(self) -> tuple[float, float]:
-        return 0.0, inf
+    support = 0.0, inf
 
     @property
     def gaussian(self) -> tuple[float, float, float]:
@@ -237,10 +234,7 @@ class HalfCauchy(Prior):
     name = "half-cauchy"
     with_unit = ("scale",)
     has_moments = False
-
-    @property
-    def support(self) -> tuple[float, float]:
-        return 0.0, inf
+    support = 0.0, inf
 
     def log_density(self, value: Any) -> Any:
         return log(2 / (pi * self.scale)) - _log(1 + (value / self.scale) ** 2)
@@ -257,10 +251,7 @@ class Exponential(Prior):
 
     name = "exponential"
     with_unit = ("mean",)
-
-    @property
-    def support(self) -> tuple[float, float]:
-        return 0.0, inf
+    support = 0.0, inf
 
     def log_density(self, value: Any) -> Any:
         return -value / self.mean - log(self.mean)
@@ -278,14 +269,11 @@ class LogNormal(Prior):
 
     name = "log-normal"
     with_unit = ("median",)
+    support = 0.0, inf
 
     def _check(self) -> None:
         if self.median <= 0 or self.sd_log <= 0:
             raise InputError(f"prior {self}: median and sd_log must be positive.")
-
-    @property
-    def support(self) -> tuple[float, float]:
-        return 0.0, inf
 
     def log_density(self, value: Any) -> Any:
         logarithm = _log(value)

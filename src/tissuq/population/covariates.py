@@ -116,13 +116,11 @@ class LevelCovariate(Covariate):
 
     levels: tuple[str, ...]
 
+    size = 1.0
+
     @property
     def effects(self) -> tuple[tuple[str, str], ...]:
         return tuple((f"{self.name} {level}", f"against {self.reference}") for level in self.levels[1:])
-
-    @property
-    def size(self) -> float:
-        return 1.0
 
     @property
     def reference(self) -> str:

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from math import isqrt
 from typing import Any
 
 import jax
@@ -87,10 +86,8 @@ class Hierarchy:
     @property
     def effects(self) -> FloatArray:
         """Effects B (chains, draws, k, d) of the columns of the covariates."""
-        chains, draws, size = self.mean.shape
-        start = size * (size + 3) // 2
-        count = (self.sampled.values.shape[2] - start) // size
-        return np.asarray(self.sampled.values[..., start:].reshape(chains, draws, count, size))
+        *_, effects = _parted(self.sampled.values, self.mean.shape[2])
+        return np.asarray(effects)
 
     @cached_property
     def diagnostics(self) -> NutsDraws:
@@ -179,35 +176,28 @@ def _corrected(sampled: NutsDraws, coarse: Any, fine: Any, design: Any, seed: in
     return Hierarchy(mean[rows], root[rows], specimens[rows], corrected, effective)
 
 
-def _population(position: Any) -> tuple[Any, Any]:
-    """Return the mean (d,) and the root (d, d) of the covariance at a point of the box: m, tau, partial correlations.
+def _root(tau: Any, partial: Any) -> Any:
+    """Return the root (d, d) of the covariance between specimens from spreads (d,) and partial correlations.
 
     Row by row, every partial correlation takes its share of what is left of a unit row (Lewandowski, Kurowicka & Joe
     2009).
     """
-    size = _size(position)
-    mean, tau, partial = position[:size], position[size : 2 * size], position[2 * size :]
-    rows = []
+    size, rows = len(tau), []
     for i in range(size):
         row, remaining = [], jnp.asarray(1.0)
         for j in range(i):
             row.append(partial[i * (i - 1) // 2 + j] * jnp.sqrt(remaining))
             remaining = remaining * (1 - partial[i * (i - 1) // 2 + j] ** 2)
         rows.append(jnp.stack([*row, jnp.sqrt(remaining), *[jnp.asarray(0.0)] * (size - i - 1)]))
-    return mean, tau[:, None] * jnp.stack(rows)
+    return tau[:, None] * jnp.stack(rows)
 
 
-def _parted(position: Any, columns: int) -> tuple[Any, Any]:
-    """Return m, tau and partial correlations of a point, and the effects (k, d) of columns of covariates."""
-    length, offset = int(position.shape[0]), 3 + 2 * columns
-    size = (isqrt(offset**2 + 8 * length) - offset) // 2
-    start = length - columns * size
-    return position[:start], position[start:].reshape(columns, size)
-
-
-def _size(position: Any) -> int:
-    """Return how many parameters have a mean, a spread and a correlation with each other in a point."""
-    return (isqrt(9 + 8 * int(position.shape[0])) - 3) // 2
+def _parted(position: Any, size: int) -> tuple[Any, Any, Any, Any]:
+    """Return m (d,), tau (d,), partial correlations and effects (k, d) of columns of covariates at a point (..., n)."""
+    start = size * (size + 3) // 2
+    whole, effects = position[..., :start], position[..., start:]
+    effects = effects.reshape(*effects.shape[:-1], -1, size)
+    return whole[..., :size], whole[..., size : 2 * size], whole[..., 2 * size :], effects
 
 
 def _log_posterior_of_scores(position: Any, data: Any) -> Any:
@@ -229,16 +219,14 @@ def _scale(position: Any, data: Any) -> Any:
 
 def _log_posterior(position: Any, data: Any) -> Any:
     """Return the log density of a population."""
-    position, effects = _parted(position, data["design"].shape[1])
-    size = _size(position)
-    tau, partial = position[size : 2 * size], position[2 * size :]
+    size = data["pull"].shape[-1]
+    mean, tau, partial, effects = _parted(position, size)
     level = jnp.array([j + 1 for i in range(size) for j in range(i)])
     power = LKJ_CONCENTRATION - 1 + 0.5 * (size - 1 - level)
-    prior = -0.5 * (position[:size] ** 2).sum() / MEAN_PRIOR_SD**2 - 0.5 * (tau**2).sum() / data["spread"] ** 2
+    prior = -0.5 * (mean**2).sum() / MEAN_PRIOR_SD**2 - 0.5 * (tau**2).sum() / data["spread"] ** 2
     prior += (power * jnp.log1p(-(partial**2))).sum()
     prior += -0.5 * (effects**2).sum() / EFFECT_PRIOR_SD**2 if effects.size else 0.0
-    mean, root = _population(position)
-    terms, _, _ = _terms(mean, root, *_around(_offset(data["design"], effects), data))
+    terms, _, _ = _terms(mean, _root(tau, partial), *_around(_offset(data["design"], effects), data))
     return prior + jax.scipy.special.logsumexp(terms, axis=1).sum()
 
 
@@ -248,9 +236,8 @@ def _corrected_draws(points: Any, keys: Any, coarse: Any, fine: Any, design: Any
 
     def complete(point_and_key: Any) -> Any:
         point, key = point_and_key
-        position, effects = _parted(point, design.shape[1])
-        mean, root = _population(position)
-        offset = _offset(design, effects)
+        mean, tau, partial, effects = _parted(point, coarse["pull"].shape[-1])
+        root, offset = _root(tau, partial), _offset(design, effects)
         coarse_terms, _, _ = _terms(mean, root, *_around(offset, coarse))
         terms, triangle, half = _terms(mean, root, *_around(offset, fine))
         gain = (jax.nn.logsumexp(terms, axis=1) - jax.nn.logsumexp(coarse_terms, axis=1)).sum()

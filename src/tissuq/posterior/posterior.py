@@ -29,7 +29,7 @@ from tissuq.mechanics import Material
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
-from tissuq.next_test.candidates import Target
+from tissuq.next_test.targets import Target
 from tissuq.parameters.checks import checked_path
 from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups

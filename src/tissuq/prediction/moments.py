@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -196,21 +196,13 @@ def mean_curve_and_slopes(
     curve = model.at_measurements(components.weights @ mean)
     if not with_slopes:
         return curve, None
-    slopes = stress_slopes(model, components, model.states, mean)
+    slopes = slopes_of(lambda states: stress_moments(model, components, states)[0], model.states, mean)
     return curve, model.at_measurements(np.einsum("m,mgc->gc", components.weights, slopes))
 
 
-def stress_slopes(
-    model: StatisticalModel,
-    components: GaussianMixture,
-    states: States,
-    mean: FloatArray,
-    *,
-    discrepancy: bool = True,
-) -> FloatArray:
-    """Return the slopes (M, g, c) of mean stresses (M, g) along the controls of their paths, MPa; zero beyond these."""
-    displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
-    moved = [stress_moments(model, components, shifted, discrepancy=discrepancy)[0] for shifted in displaced]
+def slopes_of(stress: Callable[[States], FloatArray], states: States, mean: FloatArray) -> FloatArray:
+    """Return the slopes (M, g, c) of a stress (M, g) of states along the controls of their paths, MPa; zero beyond."""
+    moved = [stress(states.displaced(control, STRETCH_STEP)) for control in range(states.controls)]
     return (np.stack(moved, axis=-1) - mean[:, :, None]) / STRETCH_STEP
 
 

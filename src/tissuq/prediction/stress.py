@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -15,14 +15,7 @@ from tissuq.mechanics.equilibrium import has_free_axis
 from tissuq.mechanics.rays import Range, drawn_back, share_to_end
 from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import (
-    STRETCH_STEP,
-    drawn_stress,
-    stress_moments,
-    stress_slopes,
-    stresses_beyond,
-    values_of,
-)
+from tissuq.prediction.moments import drawn_stress, slopes_of, stress_moments, stresses_beyond, values_of
 
 MIN_DRAWS = 6000
 """Draws, at the least, that stand for a posterior beyond the range of its data."""
@@ -75,15 +68,13 @@ class Stress:
     def slopes(self, states: States, mean: FloatArray) -> FloatArray:
         """Return the slopes (M, g, c) of the means (M, g) along the controls of their paths, MPa; zero beyond these."""
         if self._follows_draws(states):
-            moved = (self._in_equilibrium(states.displaced(n, STRETCH_STEP)) for n in range(states.controls))
-            return (np.stack(list(moved), axis=-1) - mean[:, :, None]) / STRETCH_STEP
+            return slopes_of(self._in_equilibrium, states, mean)
         if len(mean) == len(self.components):
-            return stress_slopes(self.model, self.components, states, mean, discrepancy=self.with_discrepancy)
-        displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
-        undisplaced, *stresses = (
-            drawn_stress(self.model, self._drawn[0], shifted, self._drawn[1]) for shifted in (states, *displaced)
-        )
-        return (np.stack(stresses, axis=-1) - undisplaced[:, :, None]) / STRETCH_STEP
+            of_moments = partial(stress_moments, self.model, self.components, discrepancy=self.with_discrepancy)
+            return slopes_of(lambda moved: of_moments(moved)[0], states, mean)
+        drawn, probability = self._drawn
+        of_draws = partial(drawn_stress, self.model, drawn, probability=probability)
+        return slopes_of(of_draws, states, of_draws(states))
 
     def _follows_draws(self, states: States) -> bool:
         """Return whether the stress is linear in no parameters, as the material finds its lateral stretch by them."""

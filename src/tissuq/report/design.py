@@ -13,8 +13,8 @@ import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
-from tissuq.next_test.candidates import Target
 from tissuq.next_test.ranking import TIED
+from tissuq.next_test.targets import Target
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import said_by
 from tissuq.report.tables import significant
@@ -101,7 +101,7 @@ def design_table(study: DesignStudy, target: Target, limit: int | None = None) -
     }
     sd_now = significant(float(rows["sd_now"].iloc[0]))
     whose = ", of the tissue" * (study.specimen == "other")
-    title = f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
+    title = f"{target.title}: sd {sd_now}{' ' * bool(unit)}{unit} now{whose}"
     more = len(every) - len(rows)
     note = f"{more} more tests under '{EVERY}', and in design.csv." if more else ""
     return Table.of((row for _, row in rows.iterrows()), columns, _capitalised(title), text_columns=(0, 3), note=note)
@@ -171,7 +171,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
 
 def _rows_of(study: DesignStudy, target: Target) -> pd.DataFrame:
     """Return the rows of a target, standard deviations in the unit of the data, which stands among them."""
-    rows, has_unit = study.table[study.table["target"] == target.name], target.unit(study.posterior.model)
+    rows, has_unit = study.table[study.table["target"] == target.name], target.unit
     to_mpa, name = (study.unit.to_mpa, study.unit.name) if has_unit else (1.0, "")
     return rows.assign(unit=name, **{column: rows[column] / to_mpa for column in SDS})
 
@@ -192,7 +192,7 @@ def _best(study: DesignStudy, target: Target) -> Number | None:
     remark = f"lowers its sd by {100 * row['reduction']:.0f} %, to {after}{_tied(best)}"
     if len(again):
         remark += f"; repeating the data, by {100 * again.iloc[-1]['reduction']:.0f} %"
-    return Number(f"For {target.title(study.posterior.model)}:", str(row["candidate"]), remark=remark)
+    return Number(f"For {target.title}:", str(row["candidate"]), remark=remark)
 
 
 def _sentences(study: DesignStudy) -> list[str]:
@@ -203,7 +203,7 @@ def _sentences(study: DesignStudy) -> list[str]:
         if not len(best):
             continue
         row = best.iloc[0]
-        title = _capitalised(target.title(study.posterior.model))
+        title = _capitalised(target.title)
         reduction = f"{100 * row['reduction']:.0f} %{_tied(best)}"
         words = f"{title}: {row['candidate']}, is expected to lower its sd by {reduction}"
         if len(again):
@@ -250,6 +250,6 @@ def _panel(
     axis.set_xlim(0, 1.04 * sd_now)
     axis.locator_params(axis="x", nbins=4)
     axis.xaxis.set_major_formatter("{x:.3g}")
-    axis.set_title(target.title(study.posterior.model))
+    axis.set_title(target.title)
     axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}\n(line: now)", loc="right")
     axis.tick_params(axis="y", length=0)

@@ -14,10 +14,9 @@ from tissuq.experiments.modes import loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Material
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.next_test.candidates import Target, target_named
 from tissuq.next_test.next_test import NextTest
-from tissuq.next_test.quantities import QuantityTarget, quantity_target
 from tissuq.next_test.ranking import rank_tests
+from tissuq.next_test.targets import QuantityTarget, Target, quantity_target, target_named
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.earlier_run import load
 from tissuq.studies.ensemble import drawn_materials
@@ -89,7 +88,7 @@ class DesignStudy:
         """Warnings about the numbers in the table."""
         inaccurate = "Numbers marked rough are not reliable: few components of the posterior would remain."
         unexplained = [
-            f"{target.words}: the stresses of the material within the measured strains explain "
+            f"{target.title}: the stresses of the material within the measured strains explain "
             f"{100 * target.explained:.0f} % of its variance over the draws of the ensemble. The rest (strains beyond, "
             "other materials, what is not linear) stays in every expected sd."
             for target in self.targets

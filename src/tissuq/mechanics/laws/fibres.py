@@ -46,6 +46,7 @@ class FibreMaterial(Material):
     form = "exponential-fibres:one@30 (one family of fibres, not two; at 30 degrees, a known angle; any law of fibres)"
     is_isotropic = False
     needs_matrix = True
+    felt_axes = (0, 1)
 
     def __post_init__(self) -> None:
         if self.families not in (1, 2):
@@ -58,8 +59,12 @@ class FibreMaterial(Material):
         name = f"{self.name}{':one' if self.families == 1 else ''}"
         name += f"@{self.degrees:.15g}" if self.degrees is not None else ""
         parameters = tuple(replace(free, description=f"{free.description} ({name})") for free in parameters)
-        for attribute, value in (("name", name), ("parameters", parameters)):
-            object.__setattr__(self, attribute, value)
+        self._describe(
+            name=name,
+            parameters=parameters,
+            felt_axes=(0,) if self._is_along_axis else (0, 1),
+            shears=self.families == 1 and self.degrees not in (0, 90),
+        )
 
     @classmethod
     def named(cls, name: str) -> FibreMaterial | None:
@@ -108,16 +113,6 @@ class FibreMaterial(Material):
             "two families, or one along an axis (:one@0, :one@90), as one at an angle shears, too; and fitted where "
             "the matrix has one stiffness, as neo-hookean."
         )
-
-    @property
-    def felt_axes(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The axis of the fibres where they lie along one, else both."""
-        return (0,) if self._is_along_axis else (0, 1)
-
-    @property
-    def shears(self) -> bool:  # type: ignore[override]
-        """Whether there is one family that lies along no axis, or may do so."""
-        return self.families == 1 and self.degrees not in (0, 90)
 
     @property
     def _is_along_axis(self) -> bool:

@@ -26,7 +26,7 @@ class Gent(Material):
     name = "gent"
     formula = "-mu Jm/2 ln(1 - (I1 - 3)/Jm)"
     source = "Gent 1996"
-    parameters = (Parameter("mu", "initial shear modulus of Gent's law", support=(0.0, inf)), LIMIT)
+    parameters = (Parameter.shear_modulus("Gent's law"), LIMIT)
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, limit = values
@@ -74,7 +74,7 @@ class VanDerWaals(Material):
     source = "Kilian 1981"
     caution = "A is a mu with the interaction parameter a of Kilian and Abaqus, and Jm is lambda_m^2 - 3; beta is zero."
     parameters = (
-        Parameter("mu", "initial shear modulus of the van der Waals network", support=(0.0, inf)),
+        Parameter.shear_modulus("the van der Waals network"),
         Parameter("A", "attraction: softening in proportion to sqrt(I1 - 3)", support=(0.0, inf)),
         LIMIT,
     )
@@ -119,7 +119,7 @@ class ArrudaBoyce(Material):
         "mu is the modulus at the reference, not n k T; a chain has N = 1 + Jm/3 links. The inverse Langevin function "
         "is not the series of five terms of Abaqus and others, which does not lock."
     )
-    parameters = (Parameter("mu", "initial shear modulus of the eight-chain model", support=(0.0, inf)), LIMIT)
+    parameters = (Parameter.shear_modulus("the eight-chain model"), LIMIT)
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, limit = values

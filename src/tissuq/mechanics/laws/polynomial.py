@@ -115,34 +115,22 @@ class Rivlin(Material):
                 "a Rivlin polynomial needs its coefficients, each once, such as rivlin:C10,C01,C11 for C11 (I1 - 3) "
                 f"(I2 - 3) beside Mooney and Rivlin's terms; it was given '{','.join(self.terms)}'."
             )
+        products = {term: _product(*map(int, term[1:])) for term in self.terms}
+        shared = {parameter.symbol: parameter for parameter in (C10, C01, C20, C30)}
+        self._describe(
+            name=f"rivlin:{','.join(self.terms)}",
+            formula=" + ".join(f"{term} {product}" for term, product in products.items()),
+            caution=MooneyRivlin.caution if "C01" in self.terms else "",
+            parameters=tuple(
+                shared.get(term) or Parameter(term, f"coefficient of {product}") for term, product in products.items()
+            ),
+        )
 
     @classmethod
     def named(cls, name: str) -> Self | None:
         """Return the polynomial of a name such as ``rivlin:C10,C11``; None for other names."""
         family, _, terms = name.partition(":")
         return cls(tuple(term.strip() for term in terms.split(","))) if family == "rivlin" else None
-
-    @property
-    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """The name by which it is found."""
-        return f"rivlin:{','.join(self.terms)}"
-
-    @property
-    def formula(self) -> str:  # type: ignore[override]
-        """The sum of its terms."""
-        return " + ".join(f"{term} {_product(*map(int, term[1:]))}" for term in self.terms)
-
-    @property
-    def caution(self) -> str:  # type: ignore[override]
-        """That of Mooney and Rivlin, where there is a term in I2 alone."""
-        return MooneyRivlin.caution if "C01" in self.terms else ""
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        """One for each term."""
-        shared = {parameter.symbol: parameter for parameter in (C10, C01, C20, C30)}
-        names = {term: f"coefficient of {_product(*map(int, term[1:]))}" for term in self.terms}
-        return tuple(shared.get(term) or Parameter(term, name) for term, name in names.items())
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         x, y = I1 - 3, I2 - 3

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf
 from typing import Any
 
 from tissuq.errors import ModelError
@@ -141,29 +140,18 @@ class Ogden(_Ogden):
     def __post_init__(self) -> None:
         if not 1 <= self.terms <= MAX_TERMS:
             raise ModelError(f"an Ogden material has 1 to {MAX_TERMS} terms, not {self.terms}.")
+        negative = [(-high, -low) for low, high in _intervals(self.terms // 2)]
+        self._describe(
+            name=f"ogden-{self.terms}",
+            formula=Ogden3.formula.replace("1 to 3", f"1 to {self.terms}"),
+            parameters=_moduli_and_exponents(*_intervals(self.terms - self.terms // 2), *negative),
+        )
 
     @classmethod
     def named(cls, name: str) -> _Ogden | None:
         """Return the material of a name such as ``ogden-4``; None for other names, and for those with own classes."""
         match = re.fullmatch(r"ogden-(\d+)", name)
         return cls(int(match[1][:9])) if match and not 1 <= int(match[1][:9]) <= 3 else None
-
-    @property
-    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
-        """The name by which it is found."""
-        return f"ogden-{self.terms}"
-
-    @property
-    def formula(self) -> str:  # type: ignore[override]
-        """The sum of its terms."""
-        return Ogden3.formula.replace("1 to 3", f"1 to {self.terms}")
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        """Moduli, then exponents."""
-        positive = _intervals(self.terms - self.terms // 2)
-        negative = [(-high, -low) for low, high in _intervals(self.terms // 2)]
-        return _moduli_and_exponents(*positive, *negative)
 
 
 def _intervals(count: int) -> list[tuple[float, float]]:
@@ -172,17 +160,13 @@ def _intervals(count: int) -> list[tuple[float, float]]:
     return list(pairwise(SMALLEST_EXPONENT * ratio ** (end / count) for end in range(count + 1))) if count else []
 
 
-def _modulus(law: str) -> tuple[Parameter]:
-    return (Parameter("mu", f"initial shear modulus of {law}", support=(0.0, inf)),)
-
-
 class ValanisLandel(StretchMaterial):
     """W = 2 mu sum over k of (l_k ln(l_k) - l_k + 1), so that w'(l) = 2 mu ln(l); initial shear modulus mu."""
 
     name = "valanis-landel"
     formula = "2 mu sum over k of (l_k ln(l_k) - l_k + 1)"
     source = "Valanis & Landel 1967"
-    parameters = _modulus("Valanis and Landel's law")
+    parameters = (Parameter.shear_modulus("Valanis and Landel's law"),)
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         return 2 * values[0] * sum(stretch * log(stretch) - stretch + 1 for stretch in stretches)
@@ -197,7 +181,7 @@ class PengLandel(StretchMaterial):
     name = "peng-landel"
     formula = "3 mu sum over k of (l_k - 1 - e - e^2/6 + e^3/18 - e^4/216), e = ln(l_k)"
     source = "Peng & Landel 1972"
-    parameters = _modulus("Peng and Landel's law")
+    parameters = (Parameter.shear_modulus("Peng and Landel's law"),)
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         logs = [log(stretch) for stretch in stretches]
@@ -210,7 +194,7 @@ class Hencky(StretchMaterial):
     name = "hencky"
     formula = "mu (ln(l1)^2 + ln(l2)^2 + ln(l3)^2)"
     source = "Hencky 1931"
-    parameters = _modulus("Hencky's law")
+    parameters = (Parameter.shear_modulus("Hencky's law"),)
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         return values[0] * sum(log(stretch) ** 2 for stretch in stretches)

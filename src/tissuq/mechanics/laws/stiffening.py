@@ -11,10 +11,6 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform
 
 
-def _modulus(law: str) -> Parameter:
-    return Parameter("mu", f"initial shear modulus of {law}", support=(0.0, inf))
-
-
 def _rate(law: str, highest: float = 20.0) -> Parameter:
     prior = LogUniform(0.01, highest)
     return Parameter("b", f"how fast {law} stiffens", "rate", (0.0, inf), is_linear=False, relative_prior=prior)
@@ -30,7 +26,7 @@ class Demiray(Material):
     name = "demiray"
     formula = "mu/(2 b) (exp(b (I1 - 3)) - 1)"
     source = "Demiray 1972"
-    parameters = (_modulus("Demiray's law"), _rate("Demiray's law"))
+    parameters = (Parameter.shear_modulus("Demiray's law"), _rate("Demiray's law"))
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, rate = values
@@ -46,7 +42,7 @@ class Fung(Material):
     name = "fung"
     formula = "mu/b (exp(b tr(E^2)) - 1), tr(E^2) = (I1^2 - 2 I1 - 2 I2 + 3)/4"
     source = "Fung, Fronek & Patitucci 1979, isotropic"
-    parameters = (_modulus("Fung's law"), _rate("Fung's law", 10.0))
+    parameters = (Parameter.shear_modulus("Fung's law"), _rate("Fung's law", 10.0))
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, rate = values
@@ -64,7 +60,7 @@ class VerondaWestmann(Material):
     name = "veronda-westmann"
     formula = "mu/b (exp(b (I1 - 3)) - 1) - mu/2 (I2 - 3)"
     source = "Veronda & Westmann 1970"
-    parameters = (_modulus("Veronda and Westmann's law"), _rate("Veronda and Westmann's law"))
+    parameters = (Parameter.shear_modulus("Veronda and Westmann's law"), _rate("Veronda and Westmann's law"))
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, rate = values
@@ -82,7 +78,7 @@ class Knowles(Material):
     formula = "mu/(2 b) ((1 + b (I1 - 3)/n)^n - 1)"
     source = "Knowles 1977"
     parameters = (
-        Parameter("mu", "initial shear modulus of Knowles' law", support=(0.0, inf)),
+        Parameter.shear_modulus("Knowles' law"),
         Parameter("b", "how fast Knowles' law changes", "rate", (0.0, inf), False, LogUniform(0.01, 20.0)),
         Parameter("n", "exponent: above one it hardens", "number", (0.0, inf), False, LogUniform(0.5, 10.0)),
     )
