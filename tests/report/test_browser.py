@@ -197,6 +197,25 @@ def test_parameters_that_are_moved_draw_the_material_alone(of_one_test):
         assert "yours" not in page.inner_text(READOUT)
 
 
+def test_a_limit_that_is_moved_draws_the_material_that_locks_there(tmp_path):
+    file = tmp_path / "stiffening.csv"
+    rows = [(x, (x - x**-2) * (1 + 0.1 * (x**2 + 2 / x - 3))) for x in np.linspace(0.7, 1.6, 19)]
+    file.write_text("stretch,stress_kPa\n" + "".join(f"{x:.6g},{y:.6g}\n" for x, y in rows), encoding="utf-8")
+    settings = SpecimenSettings(tests=[{"file": str(file), "noise_sd": 0.2}], material="gent", discrepancies=["none"])
+    (tmp_path / "run").mkdir()
+    write_result(specimen_result(run_specimen(settings)), tmp_path / "run")
+    with opened(tmp_path / "run" / "report.html") as page:
+        page.fill(TYPED, "1.5")
+        modulus = float(page.locator(OF_PARAMETERS).first.input_value())
+        slider = page.locator(OF_PARAMETERS).nth(1)
+        for share in (0.01, 0.1, 0.5):
+            move = "(slider, x) => { slider.value = +slider.min + x * (slider.max - slider.min);"
+            slider.evaluate(move + " slider.dispatchEvent(new Event('input')); }", share)
+            limit = float(slider.input_value())
+            stress = modulus * (1.5 - 1.5**-2) / (1 - (1.5**2 + 2 / 1.5 - 3) / limit)
+            assert said(page)[-1] == pytest.approx(stress, rel=6e-3)
+
+
 def test_what_is_selected_is_shown_alone_and_all_comes_back(of_one_test):
     with opened(of_one_test) as page:
         picture = page.locator("#chart canvas")

@@ -46,9 +46,9 @@
     return column[low] == null || column[high] == null ? null : (1 - share) * column[low] + share * column[high];
   };
 
-  // Weights of the nodes of the exponent for its value: barycentric, for Chebyshev nodes of the second kind.
+  // Weights of the nodes of the exponent, or of its logarithm, for its value: barycentric, for Chebyshev nodes of the second kind.
   const nodeWeights = () => {
-    const nodes = data.nodes, value = values[values.length - 1], hit = nodes.indexOf(value);
+    const nodes = data.nodes, last = values[values.length - 1], value = data.is_logarithm ? Math.log(last) : last, hit = nodes.indexOf(value);
     if (!nodes.length) return [1];
     if (hit >= 0) return nodes.map((_, index) => Number(index === hit));
     const terms = nodes.map((node, index) => (index % 2 ? -1 : 1) * (index % (nodes.length - 1) ? 1 : 0.5) / (value - node));
