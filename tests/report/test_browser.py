@@ -150,6 +150,20 @@ def test_loading_and_unloading_are_read_out_apart(tmp_path):
         assert words in page.inner_text(READOUT)
 
 
+def test_small_strains_are_told_apart_in_words(tmp_path):
+    file = tmp_path / "stiff.csv"
+    file.write_text("stretch,stress_kPa\n" + "".join(f"{x:.5g},{x - x**-2:.5g}\n" for x in np.linspace(1, 1.0062, 9)))
+    study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 1e-4}], discrepancies=["none"]))
+    (tmp_path / "run").mkdir()
+    write_result(specimen_result(study), tmp_path / "run")
+    with opened(tmp_path / "run" / "report.html") as page:
+        page.fill(TYPED, "1.0031")
+        assert page.inner_text(READOUT).startswith("stretch 1.0031, in Pa:")
+        assert page.get_attribute(SLIDER, "aria-valuetext") == "1.0031"
+        page.fill(TYPED, "1.0063")
+        assert page.inner_text(READOUT).startswith("1.0063 is beyond 1 to 1.0062,")
+
+
 def test_small_stresses_are_told_apart_on_the_axis_and_in_words(tmp_path):
     file = tmp_path / "soft.csv"
     file.write_text("stretch,stress_psi\n" + "".join(f"{x},{6e-5 * (x - x**-2)}\n" for x in np.linspace(1, 1.3, 9)))
