@@ -86,6 +86,14 @@ def test_the_sliders_of_linear_parameters_give_the_stress_of_the_material(poster
     np.testing.assert_allclose(of_node(data, 0) @ list(values.values()), closed_form, rtol=1e-3, atol=0.3)
 
 
+def test_a_slider_ends_where_the_prior_does():
+    priors = {"C10": tq.Uniform(0.0, 0.6)}
+    vague = tq.simulate("neo-hookean", {"C10": 0.5}, [0.9, 1.1], noise_sd=0.2, seed=1)
+    posterior = tq.fit(vague, discrepancy="none", noise_sd=0.2, priors=priors)
+    (slider,) = chart_data({"none": posterior}, "none", KPA)["parameters"]
+    assert (slider["low"], slider["high"]) == (0.0, 600.0)
+
+
 def ogden(alpha, x):
     return 2 / alpha * (x ** (alpha - 1) - x ** (-alpha / 2 - 1))
 

@@ -31,7 +31,8 @@ MAX_MEASUREMENTS = 1000
 DIGITS = 5
 """Significant digits of the numbers on the page."""
 SLIDER_SDS, SLIDER_TAIL = 5.0, 0.001
-"""Reach of a slider: standard deviations on each side of the mean; for an exponent the probability beyond an end."""
+"""Reach of a slider: standard deviations on each side of the mean, as far as the prior reaches; for an exponent the
+probability beyond an end."""
 NODES, MAX_ERROR = 9, 0.01
 """Values of an exponent at which the material's curves are known, and error of these between them over the largest."""
 
@@ -243,7 +244,8 @@ class _Sliders:
         for parameter in self._model.material.parameters:
             if parameter.is_linear:
                 mean, sd = marginals[parameter.symbol].mean, marginals[parameter.symbol].sd
-                numbers = np.array([mean, mean - SLIDER_SDS * sd, mean + SLIDER_SDS * sd]) / unit.to_mpa
+                support = self._model.priors[parameter.symbol].support
+                numbers = np.clip(mean + sd * np.array([0.0, -SLIDER_SDS, SLIDER_SDS]), *support) / unit.to_mpa
                 self.parameters.append(_slider(parameter.symbol, unit.name, numbers))
         self.nodes: _Nodes | None = None
         self.fixed = list(bent)
