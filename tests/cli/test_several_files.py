@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 
 import numpy as np
@@ -135,8 +136,11 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
     found = tq.held_out_tests(parts, discrepancy="none", noise_sd=1.5e-3)
     rows = rows_in_mpa(here / "run" / "held_out.csv")
     assert [row["test"] for row in rows] == ["b", "uniaxial"]
-    for name in ("inside", "beyond", "half_width", "error", "C10_median"):
+    for name in ("inside", "beyond", "half_width", "error", "crps", "interval_score", "C10_median"):
         assert [float(row[name]) for row in rows] == pytest.approx(found[name].tolist(), rel=1e-9)
+    of_json = json.loads((here / "run" / "held_out.json").read_text())
+    assert {row["unit"] for row in of_json} == {"kPa"}
+    assert [row["crps"] for row in of_json] == pytest.approx((1000 * found["crps"]).tolist(), rel=1e-9)
     assert "Each test predicted from the others" in (here / "run" / "report.html").read_text()
     assert "Each test predicted from the others" in cli("show", "run").out
 

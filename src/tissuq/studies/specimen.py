@@ -290,7 +290,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     -------
     pandas.DataFrame
         One row a test, as `prediction_of` describes it, and median and 95 % interval of the headline parameter from the
-        others, MPa.
+        others; stresses, scores included, in MPa.
 
     Raises
     ------
