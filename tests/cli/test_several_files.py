@@ -141,6 +141,7 @@ def test_a_stress_in_the_unit_of_files_that_have_several_is_refused(cli, files, 
     of_each = cli("fit", *tests, "--noise-sd", "1,100", "--estimand", "as-tested", "--out", "of_each")
     assert of_each.status == 0, of_each.err
     np.testing.assert_allclose(tq.load(here / "of_each").model.noise.sds, [1e-3, 1e-4])
+    assert "Noise: sd 1 kPa, 100 Pa." in cli("show", "of_each", "--details").out
 
 
 def test_every_test_is_predicted_from_the_others(cli, files, here):

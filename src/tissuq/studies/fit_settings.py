@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
     from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.experiments.reading.specimens_in_files import CovariateTable
+    from tissuq.experiments.units import StressUnit
     from tissuq.mechanics import Material
     from tissuq.model.noise import Noise
 
@@ -161,16 +162,15 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
             )
         return Experiment.of(tests)
 
-    def noise_of(self, experiment: Experiment) -> Noise:
-        """Return the noise, known standard deviations converted to MPa from the unit of their test."""
-        from tissuq.experiments.units import stress_unit
+    def noise_in(self, *units: StressUnit) -> Noise:
+        """Return the noise, known standard deviations converted to MPa from the unit of each test, or that of all."""
         from tissuq.model.noise import noise_named
 
-        units = [stress_unit(test.stress_unit) for test in experiment.tests]
-        pairs = zip(self.tests, units, strict=True) if self.tests else ()
-        if values := [test.noise_sd * unit.to_mpa for test, unit in pairs if test.noise_sd is not None]:
-            return noise_named(values)
-        return self.noise_in(units[0])
+        values = [test.noise_sd for test in self.tests if test.noise_sd is not None]
+        if values:
+            of_tests = units if len(units) > 1 else units * len(values)
+            return noise_named([value * unit.to_mpa for value, unit in zip(values, of_tests, strict=True)])
+        return super().noise_in(*units)
 
 
 class LawSettings(SpecimenSettings):

@@ -244,12 +244,12 @@ class FittedSettings(Settings):
             )
         return self
 
-    def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise of all, a known standard deviation converted from a unit to MPa."""
+    def noise_in(self, *units: StressUnit) -> Noise:
+        """Return the noise of all, a known standard deviation converted from their unit, the first, to MPa."""
         from tissuq.model.noise import noise_named
 
         if isinstance(self.noise_sd, float):
-            return noise_named(self.noise_sd * unit.to_mpa)
+            return noise_named(self.noise_sd * units[0].to_mpa)
         return noise_named(self.noise or "unknown")
 
     def tolerances_in(self, unit: StressUnit) -> Tolerances | dict[str, float] | None:

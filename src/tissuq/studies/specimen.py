@@ -216,8 +216,8 @@ def _options(
 def shared_options(settings: SpecimenSettings, experiment: Experiment) -> dict[str, Any]:
     """Return the options of a fit that do not depend on material and discrepancy."""
     stated = {name: getattr(settings, name) for name in ("method", "stable_in", "seed")}
-    unit = stress_unit(experiment.stress_unit)
-    return {"noise": settings.noise_of(experiment), "tolerances": settings.tolerances_in(unit), **stated}
+    units = [stress_unit(test.stress_unit) for test in experiment.tests]
+    return {"noise": settings.noise_in(*units), "tolerances": settings.tolerances_in(units[0]), **stated}
 
 
 def _names(settings: SpecimenSettings) -> list[str]:
@@ -234,7 +234,7 @@ def parameters_of(
     settings: SpecimenSettings, material: Material, discrepancy: str, experiment: Experiment
 ) -> tuple[Parameter, ...]:
     """Return the parameters of a fit: of the material, the discrepancy and the noise."""
-    noise = settings.noise_of(experiment).parameters
+    noise = settings.noise_in(stress_unit("MPa")).parameters
     error_model = discrepancy_named(discrepancy)
     with suppress(ModelError):  # which the fit itself raises
         error_model = error_model.adapted_to(material, experiment)
