@@ -136,6 +136,7 @@ MISNAMED = [
     (["--prior", "D1=uniform(0,5)"], ["'D1'", "C10"]),
     (["--material", "yeoh", "--material", "gent", "--prior", "D1=uniform(0,5)"], ["'D1'", "C20", "Jm"]),
     (["--tolerance", "stress=2"], ["'stress=2' is not a tolerance"]),
+    (["--tolerance", "none", "--estimand", "specimen"], ["'specimen' has errors of the tests", "'as-tested'"]),
 ]  # fmt: skip
 
 

@@ -91,7 +91,7 @@ def test_a_run_is_the_one_that_was_typed_where_the_folder_of_the_recipe_is_a_sym
 def test_what_to_do_next_repeats_the_modes_and_what_the_interval_is_of(cli, here, specimen):
     assert cli("fit", specimen, "--estimand", "as-tested", "--noise-sd", 1, "--no-figures", "--out", "run").status == 0
     said = cli("design", "run", *TESTS[:2], "--no-figures")
-    words = "tissuq fit DATA.csv NEW.csv --noise-sd 1 --mode uniaxial --mode planar --estimand as-tested"
+    words = "tissuq fit DATA.csv NEW.csv --mode uniaxial --mode planar --noise-sd 1 --estimand as-tested"
     assert words in " ".join(said.out.split()), said.err
 
 

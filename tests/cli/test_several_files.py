@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 
 import numpy as np
@@ -114,8 +115,9 @@ def test_tests_in_a_toml_file_have_their_own_options(cli, here):
     written(here, "uniaxial", "a.csv")
     (here / "b.csv").write_text("gamma;tau (Pa)\n0,1;9800\n0,2;20100\n0,3;29900\n0,4;40000\n")
     (here / "both.toml").write_text(
-        'discrepancies = ["none"]\nnoise_sd = 0.1\n[tolerances]\n[[tests]]\nfile = "a.csv"\nmode = "uniaxial"\n'
-        '[[tests]]\nfile = "b.csv"\nmode = "simple-shear"\ncolumns = { shear = "gamma", stress = "tau (Pa)" }\n'
+        'discrepancies = ["none"]\n[tolerances]\n[[tests]]\nfile = "a.csv"\nmode = "uniaxial"\nnoise_sd = 0.1\n'
+        '[[tests]]\nfile = "b.csv"\nmode = "simple-shear"\nnoise_sd = 100\n'
+        'columns = { shear = "gamma", stress = "tau (Pa)" }\n'
     )
     said = cli("fit", "--config", "both.toml")
     assert said.status == 0, said.err
@@ -127,6 +129,21 @@ def test_tests_in_a_toml_file_have_their_own_options(cli, here):
     assert float(row["C10_mean"]) == pytest.approx(x @ y / (x @ x), rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    "options", [["--noise-sd", "1"], ["--prior", "C10=uniform(0,90)"], ["--tolerance", "zero=0.1"]]
+)
+def test_a_stress_in_the_unit_of_files_that_have_several_is_refused(cli, files, here, options):
+    in_pascal = "".join(f"{x},{1e5 * (x - x**-2):.6g}\n" for x in (0.8, 0.9, 1.1, 1.2, 1.3))
+    (here / "pascal.csv").write_text(f"stretch,stress [Pa]\n{in_pascal}")
+    tests = [files[1], "pascal.csv", "--mode", "uniaxial", "--discrepancy", "none", "--no-figures"]
+    said = cli("fit", *tests, *options, "--out", "mixed")
+    assert (said.status, "different units (kPa, Pa)" in said.err) == (2, True), said.err
+    of_each = cli("fit", *tests, "--noise-sd", "1,100", "--estimand", "as-tested", "--out", "of_each")
+    assert of_each.status == 0, of_each.err
+    np.testing.assert_allclose(tq.load(here / "of_each").model.noise.sds, [1e-3, 1e-4])
+    assert "Noise: sd 1 kPa, 100 Pa." in cli("show", "of_each", "--details").out
+
+
 def test_every_test_is_predicted_from_the_others(cli, files, here):
     said = cli("fit", *files, *ALONE, "--noise-sd", "1.5", "--held-out", "--out", "run")
     assert said.status == 0, said.err
@@ -135,8 +152,11 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
     found = tq.held_out_tests(parts, discrepancy="none", noise_sd=1.5e-3)
     rows = rows_in_mpa(here / "run" / "held_out.csv")
     assert [row["test"] for row in rows] == ["b", "uniaxial"]
-    for name in ("inside", "beyond", "half_width", "error", "C10_median"):
+    for name in ("inside", "beyond", "half_width", "error", "crps", "interval_score", "C10_median"):
         assert [float(row[name]) for row in rows] == pytest.approx(found[name].tolist(), rel=1e-9)
+    of_json = json.loads((here / "run" / "held_out.json").read_text())
+    assert {row["unit"] for row in of_json} == {"kPa"}
+    assert [row["crps"] for row in of_json] == pytest.approx((1000 * found["crps"]).tolist(), rel=1e-9)
     assert "Each test predicted from the others" in (here / "run" / "report.html").read_text()
     assert "Each test predicted from the others" in cli("show", "run").out
 

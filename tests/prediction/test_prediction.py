@@ -83,8 +83,11 @@ def test_a_stress_is_predicted_only_where_the_material_locks_with_a_probability_
     model = gallery.fit(DATA, discrepancy="none", noise_sd=0.2).model
     basis = np.array([[[1.0], [2.0]], [[1.0], [np.inf]]])
     for share in (2e-6, 1e-3, 0.5):
-        with pytest.raises(tq.ModelError, match=r"has no stress at a stretch of 2: .*a probability of"):
+        with pytest.raises(tq.ModelError, match=r"has no stress at a stretch .*of 2: .*a probability of"):
             borne(model, np.array([1.0, 2.0]), basis, np.array([1 - share, share]))
+    shears = np.array([[[np.inf], [1.0], [np.inf]], [[1.0], [1.0], [np.inf]]])
+    with pytest.raises(tq.ModelError, match=r"of 0\.5: .* \(with a probability of 0\.25\)"):
+        borne(model, np.array([0.5, 0.4, 0.9]), shears, np.array([0.25, 0.75]))
     kept = borne(model, np.array([1.0, 2.0]), basis, np.array([1 - 5e-7, 5e-7]))
     np.testing.assert_array_equal(kept[:, :, 0], [[1.0, 2.0], [1.0, 0.0]])
 

@@ -150,6 +150,20 @@ def test_loading_and_unloading_are_read_out_apart(tmp_path):
         assert words in page.inner_text(READOUT)
 
 
+def test_small_strains_are_told_apart_in_words(tmp_path):
+    file = tmp_path / "stiff.csv"
+    file.write_text("stretch,stress_kPa\n" + "".join(f"{x:.5g},{x - x**-2:.5g}\n" for x in np.linspace(1, 1.0062, 9)))
+    study = run_specimen(SpecimenSettings(tests=[{"file": str(file), "noise_sd": 1e-4}], discrepancies=["none"]))
+    (tmp_path / "run").mkdir()
+    write_result(specimen_result(study), tmp_path / "run")
+    with opened(tmp_path / "run" / "report.html") as page:
+        page.fill(TYPED, "1.0031")
+        assert page.inner_text(READOUT).startswith("stretch 1.0031, in Pa:")
+        assert page.get_attribute(SLIDER, "aria-valuetext") == "1.0031"
+        page.fill(TYPED, "1.0063")
+        assert page.inner_text(READOUT).startswith("1.0063 is beyond 1 to 1.0062,")
+
+
 def test_small_stresses_are_told_apart_on_the_axis_and_in_words(tmp_path):
     file = tmp_path / "soft.csv"
     file.write_text("stretch,stress_psi\n" + "".join(f"{x},{6e-5 * (x - x**-2)}\n" for x in np.linspace(1, 1.3, 9)))
@@ -195,6 +209,25 @@ def test_parameters_that_are_moved_draw_the_material_alone(of_one_test):
         assert yours == pytest.approx(2 * top * (1.5 - 1.5**-2), rel=6e-3)
         page.click("text=back to the fit")
         assert "yours" not in page.inner_text(READOUT)
+
+
+def test_a_limit_that_is_moved_draws_the_material_that_locks_there(tmp_path):
+    file = tmp_path / "stiffening.csv"
+    rows = [(x, (x - x**-2) * (1 + 0.1 * (x**2 + 2 / x - 3))) for x in np.linspace(0.7, 1.6, 19)]
+    file.write_text("stretch,stress_kPa\n" + "".join(f"{x:.6g},{y:.6g}\n" for x, y in rows), encoding="utf-8")
+    settings = SpecimenSettings(tests=[{"file": str(file), "noise_sd": 0.2}], material="gent", discrepancies=["none"])
+    (tmp_path / "run").mkdir()
+    write_result(specimen_result(run_specimen(settings)), tmp_path / "run")
+    with opened(tmp_path / "run" / "report.html") as page:
+        page.fill(TYPED, "1.5")
+        modulus = float(page.locator(OF_PARAMETERS).first.input_value())
+        slider = page.locator(OF_PARAMETERS).nth(1)
+        for share in (0.01, 0.1, 0.5):
+            move = "(slider, x) => { slider.value = +slider.min + x * (slider.max - slider.min);"
+            slider.evaluate(move + " slider.dispatchEvent(new Event('input')); }", share)
+            limit = float(slider.input_value())
+            stress = modulus * (1.5 - 1.5**-2) / (1 - (1.5**2 + 2 / 1.5 - 3) / limit)
+            assert said(page)[-1] == pytest.approx(stress, rel=6e-3)
 
 
 def test_what_is_selected_is_shown_alone_and_all_comes_back(of_one_test):

@@ -86,24 +86,47 @@ def test_the_sliders_of_linear_parameters_give_the_stress_of_the_material(poster
     np.testing.assert_allclose(of_node(data, 0) @ list(values.values()), closed_form, rtol=1e-3, atol=0.3)
 
 
-def test_the_slider_of_an_exponent_interpolates_between_curves_that_are_exact():
-    stretch = np.linspace(0.7, 2.0, 25)
-    measured = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": 3.0}, stretch, noise_sd=0.02, seed=4)
-    posterior = tq.fit(measured, material="ogden-1", discrepancy="none", noise_sd=0.02)
+def test_a_slider_ends_where_the_prior_does():
+    priors = {"C10": tq.Uniform(0.0, 0.6)}
+    vague = tq.simulate("neo-hookean", {"C10": 0.5}, [0.9, 1.1], noise_sd=0.2, seed=1)
+    posterior = tq.fit(vague, discrepancy="none", noise_sd=0.2, priors=priors)
+    (slider,) = chart_data({"none": posterior}, "none", KPA)["parameters"]
+    assert (slider["low"], slider["high"]) == (0.0, 600.0)
+
+
+def ogden(alpha, x):
+    return 2 / alpha * (x ** (alpha - 1) - x ** (-alpha / 2 - 1))
+
+
+def gent(limit, x):
+    return (x - x**-2) / (1 - (x**2 + 2 / x - 3) / limit)
+
+
+@pytest.mark.parametrize(
+    ("law", "symbol", "closed_form", "values"),
+    [
+        ("ogden-1", "alpha1", ogden, {"mu1": 0.5, "alpha1": 3.0}),
+        ("gent", "Jm", gent, {"mu": 0.5, "Jm": 8.0}),  # from one to a hundred times the strains, near which it locks
+    ],
+)
+def test_the_slider_of_an_exponent_interpolates_between_curves_that_are_exact(law, symbol, closed_form, values):
+    measured = tq.simulate(law, values, np.linspace(0.7, 1.6, 25), noise_sd=0.1, seed=4)
+    posterior = tq.fit(measured, material=law, discrepancy="none", noise_sd=0.1)
     data = chart_data({"none": posterior}, "none", KPA)
-    assert [slider["name"] for slider in data["parameters"]] == ["mu1", "alpha1"]
+    assert [slider["name"] for slider in data["parameters"]] == [*values]
     assert data["fixed"] == []
-    exponent, x = data["parameters"][1], np.array(data["tests"][0]["x"])
-    assert min(data["nodes"]) == pytest.approx(exponent["low"])
-    assert max(data["nodes"]) == pytest.approx(exponent["high"])
-    columns = [of_node(data, 0, node)[:, 0] for node in range(len(data["nodes"]))]
-    for alpha in np.linspace(exponent["low"], exponent["high"], 7):
+    exponent, x, nodes = data["parameters"][1], np.array(data["tests"][0]["x"]), data["nodes"]
+    scale = np.log if data["is_logarithm"] else np.asarray
+    low, high = (float(scale(exponent[end])) for end in ("low", "high"))
+    assert (min(nodes), max(nodes)) == pytest.approx((low, high), rel=1e-4)
+    columns = [of_node(data, 0, node)[:, 0] for node in range(len(nodes))]
+    for value in np.linspace(exponent["low"], exponent["high"], 60):
         found = sum(
-            column * np.prod([(alpha - other) / (node - other) for other in data["nodes"] if other != node])
-            for node, column in zip(data["nodes"], columns, strict=True)
+            column * np.prod([(scale(value) - other) / (node - other) for other in nodes if other != node])
+            for node, column in zip(nodes, columns, strict=True)
         )  # Lagrange's form of the polynomial, of which the page takes the barycentric one
-        exact = 2 / alpha * (x ** (alpha - 1) - x ** (-alpha / 2 - 1))
-        np.testing.assert_allclose(found, exact, rtol=2e-3, atol=2e-3)
+        exact = closed_form(value, x)
+        np.testing.assert_allclose(found, exact, atol=0.01 * np.abs(exact).max())
 
 
 @pytest.mark.slow

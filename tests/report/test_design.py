@@ -12,7 +12,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.next_test.targets import target_named
-from tissuq.report.design import _best, design_figure, design_result, design_table
+from tissuq.report.design import _best, _noise_option, design_figure, design_result, design_table
 from tissuq.report.result import Result, Table
 from tissuq.report.writer import write_result
 from tissuq.result_warning import ResultWarning
@@ -54,7 +54,25 @@ def test_the_next_step_says_where_the_same_test_again_is_as_good(study, tmp_path
 
 def test_the_next_step_fits_what_was_fitted(study, tmp_path):
     result = design_result(study, study.settings, tmp_path / "run")
-    assert "DATA.csv NEW.csv --material gent --discrepancy none --noise-sd 20 --mode uniaxial" in result.next_step
+    words = "tissuq fit DATA.csv NEW.csv --material gent --discrepancy none --mode uniaxial --mode "
+    assert words in result.next_step
+    assert "--noise-sd 20 --estimand as-tested" in result.next_step  # kPa
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"noise_sd": [0.01, 0.04]}, " --noise-sd 10,0.04,20"),  # of the new test the geometric mean
+        ({"noise_sd": 0.02}, " --noise-sd 20,0.02,20"),
+        ({"noise": "proportional"}, " --noise proportional"),
+        ({}, ""),
+    ],
+)
+def test_the_next_step_has_the_noise_of_the_fit(options, said):
+    tests = [tq.simulate("neo-hookean", {"C10": 0.5}, [0.7, 0.9, 1.1, 1.3, 1.6], 0.02, seed=seed) for seed in (1, 2)]
+    tests = [test.labelled(stress_unit=unit) for test, unit in zip(tests, ("kPa", "MPa"), strict=True)]
+    model = tq.fit(tests, discrepancy="none", tolerances="as-tested", **options).model
+    assert _noise_option(model) == said
 
 
 def test_a_table_beneath_the_answer_has_the_ten_best_tests_and_a_folded_one_has_all(study, tmp_path):

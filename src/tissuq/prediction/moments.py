@@ -83,13 +83,13 @@ def borne(model: StatisticalModel, stretch: FloatArray, basis: FloatArray, weigh
         return basis
     locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(stretch)))
     if locked.max() > MAX_LOCKED_PROBABILITY:
-        locked_stretch = stretch[locked > MAX_LOCKED_PROBABILITY]
         bent = ", ".join(model.bent_symbols)
         why = f"its {bent} may be such that it locks before" if bent else "it is too large for a number"
-        nearest = locked_stretch[np.abs(locked_stretch - 1).argmin()]
+        refused = np.flatnonzero(locked > MAX_LOCKED_PROBABILITY)
+        nearest = min(refused, key=lambda index: (locked[index], abs(stretch[index] - 1)))
         raise ModelError(
-            f"material '{model.material.name}' has no stress at a stretch of {nearest:g}: "
-            f"{why} (up to a probability of {locked.max():.2g}). Predict at stretches nearer to those of the data."
+            f"material '{model.material.name}' has no stress at a stretch (amount of shear) of {stretch[nearest]:g}: "
+            f"{why} (with a probability of {locked[nearest]:.2g}). Predict at stretches nearer to those of the data."
         )
     return np.where(is_borne[..., None], basis, 0.0)
 

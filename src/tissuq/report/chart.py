@@ -31,9 +31,10 @@ MAX_MEASUREMENTS = 1000
 DIGITS = 5
 """Significant digits of the numbers on the page."""
 SLIDER_SDS, SLIDER_TAIL = 5.0, 0.001
-"""Reach of a slider: standard deviations on each side of the mean; for an exponent the probability beyond an end."""
+"""Reach of a slider: standard deviations on each side of the mean, as far as the prior reaches; for an exponent the
+probability beyond an end."""
 NODES, MAX_ERROR = 9, 0.01
-"""Values of an exponent at which the material's curve is known, and error of a curve between them over its largest."""
+"""Values of an exponent at which the material's curves are known, and error of these between them over the largest."""
 
 
 class _Test(NamedTuple):
@@ -90,14 +91,14 @@ def chart_data(
         material per unit of each linear parameter); ``views``, one a formulation and test, with low, median, high (of
         new measurements), stress_low, stress_high (of the stress itself), and alone_low, alone, alone_high (of the
         material alone, where there is a discrepancy and it is determined), and the limits of the axis; ``parameters``
-        with the ranges of sliders, the linear ones first; ``nodes`` of an exponent that has a slider; ``fixed``, the
-        parameters that stay at their medians; and ``unit``.
+        with the ranges of sliders, the linear ones first; ``nodes`` of an exponent that has a slider, or of its
+        logarithm (``is_logarithm``); ``fixed``, the parameters that stay at their medians; and ``unit``.
     """
     described = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     posterior = posteriors[main]
     drawn = {name: list(_measured(described[name])) for name in sorted(posteriors, key=lambda name: name != main)}
     drawn[main] += _others(posterior)
-    sliders = _Sliders(posterior, unit)
+    sliders = _Sliders(posterior, [test for test, _ in drawn[main]], unit)
     views = [
         {"formulation": name, "test": number, **_columns(bands, test, unit)}
         for name, tests in drawn.items()
@@ -108,8 +109,9 @@ def chart_data(
         "unit": unit.name,
         "tests": [_test(test, sliders.basis(test), unit) for test, _ in drawn[main]],
         "views": views,
-        "parameters": sliders.linear + ([sliders.exponent] if sliders.exponent else []),
-        "nodes": _rounded(sliders.nodes) if sliders.exponent else [],
+        "parameters": sliders.parameters,
+        "nodes": _rounded(sliders.nodes.values) if sliders.nodes else [],
+        "is_logarithm": sliders.nodes is not None and sliders.nodes.is_logarithm,
         "fixed": sliders.fixed,
     }
 
@@ -209,57 +211,76 @@ def _test(test: _Test, basis: FloatArray, unit: StressUnit) -> dict[str, Any]:
     }
 
 
+class _Nodes(NamedTuple):
+    """Chebyshev nodes of an exponent or of its logarithm, between which curves are interpolated."""
+
+    values: FloatArray
+    is_logarithm: bool
+
+    @classmethod
+    def within(cls, ends: FloatArray, *, is_logarithm: bool, shift: float = 0.0) -> _Nodes:
+        """Return nodes between the ends of the exponent; shifted by one half, the places between them."""
+        low, high = np.log(ends) if is_logarithm else ends
+        angles = np.pi * (np.arange(NODES - 2 * shift) + shift) / (NODES - 1)
+        return cls((low + high) / 2 + (high - low) / 2 * np.cos(angles), is_logarithm)
+
+    @property
+    def exponents(self) -> FloatArray:
+        return np.exp(self.values) if self.is_logarithm else self.values
+
+
 class _Sliders:
     """The material's parameters with mean and the range of a slider, and its curves from which any other is made.
 
-    A curve is a linear combination of columns. Where there is one exponent, the columns are known at Chebyshev nodes
-    of it, between which the page interpolates; several stay at their medians.
+    A curve is a linear combination of columns. Where there is one exponent, the columns are known at nodes of it,
+    between which the page interpolates; several stay at their medians.
     """
 
-    def __init__(self, posterior: Posterior, unit: StressUnit) -> None:
+    def __init__(self, posterior: Posterior, tests: Sequence[_Test], unit: StressUnit) -> None:
         self._model = posterior.model
         marginals, bent = posterior.marginals, posterior.model.bent_symbols
         self._medians = np.array([float(marginals[symbol].quantile(0.5)) for symbol in bent])
-        self.linear: list[dict[str, Any]] = []
+        self.parameters: list[dict[str, Any]] = []
         for parameter in self._model.material.parameters:
             if parameter.is_linear:
                 mean, sd = marginals[parameter.symbol].mean, marginals[parameter.symbol].sd
-                numbers = np.array([mean, mean - SLIDER_SDS * sd, mean + SLIDER_SDS * sd]) / unit.to_mpa
-                self.linear.append(_slider(parameter.symbol, unit.name, numbers))
-        self.exponent: dict[str, Any] | None = None
-        self.nodes, self.fixed = np.zeros(1), list(bent)
+                support = self._model.priors[parameter.symbol].support
+                numbers = np.clip(mean + sd * np.array([0.0, -SLIDER_SDS, SLIDER_SDS]), *support) / unit.to_mpa
+                self.parameters.append(_slider(parameter.symbol, unit.name, numbers))
+        self.nodes: _Nodes | None = None
+        self.fixed = list(bent)
         if len(bent) == 1:
-            ends = [float(marginals[bent[0]].quantile(tail)) for tail in (SLIDER_TAIL, 1 - SLIDER_TAIL)]
-            nodes = np.mean(ends) + np.ptp(ends) / 2 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
-            if self._is_known_between(nodes):
-                self.nodes, self.fixed = nodes, []
-                self.exponent = _slider(bent[0], "", np.array([self._medians[0], *ends]))
+            ends = np.array([marginals[bent[0]].quantile(tail) for tail in (SLIDER_TAIL, 1 - SLIDER_TAIL)], dtype=float)
+            kinds = (False, True) if ends[0] > 0 else (False,)
+            error, is_logarithm = min((self._error(ends, is_logarithm, tests), is_logarithm) for is_logarithm in kinds)
+            if error < MAX_ERROR:
+                self.nodes, self.fixed = _Nodes.within(ends, is_logarithm=is_logarithm), []
+                self.parameters.append(_slider(bent[0], "", np.array([self._medians[0], *ends])))
 
     def basis(self, test: _Test) -> FloatArray:
         """Return the stress of the material at every node per unit of each linear parameter: (nodes, columns, g)."""
-        return self._basis(test, self.nodes[:, None] if self.exponent else self._medians[None])
+        return self._basis(test, self.nodes.exponents[:, None] if self.nodes else self._medians[None])
 
     def _basis(self, test: _Test, settings: FloatArray) -> FloatArray:
         states = self._model.experiment.states_at(test.points, test.mode, test.channel)
         return np.asarray(stress_basis(self._model.material, states, settings)).swapaxes(1, 2)
 
-    def _is_known_between(self, nodes: FloatArray) -> bool:
-        """Return whether the columns of every measured curve are finite at nodes, and right between two of them."""
+    def _error(self, ends: FloatArray, is_logarithm: bool, tests: Sequence[_Test]) -> float:
+        """Return the largest error of a curve between nodes, over its largest value; infinite where it has no value."""
         from scipy.interpolate import BarycentricInterpolator
 
-        between = 0.5 * (nodes[:1] + nodes[1:2])
-        for curve in self._model.experiment.curves:
-            test = _Test("", curve.mode, curve.channel, curve.points, np.zeros(0), np.zeros(0))
+        nodes, between = (_Nodes.within(ends, is_logarithm=is_logarithm, shift=shift) for shift in (0.0, 0.5))
+        errors = []
+        for test in tests:
             try:
-                at_nodes, exact = (self._basis(test, values[:, None]) for values in (nodes, between))
+                at_nodes, exact = (self._basis(test, places.exponents[:, None]) for places in (nodes, between))
             except TissuqError:
-                return False
-            if not np.isfinite(at_nodes).all():
-                return False
-            error = np.abs(BarycentricInterpolator(nodes, at_nodes)(between) - exact).max()
-            if error > MAX_ERROR * np.abs(exact).max():
-                return False
-        return True
+                return np.inf
+            if not (np.isfinite(at_nodes).all() and np.isfinite(exact).all()):
+                return np.inf
+            misses = np.abs(BarycentricInterpolator(nodes.values, at_nodes)(between.values) - exact).max(axis=-1)
+            errors.append((misses / np.maximum(np.abs(exact).max(axis=-1), np.finfo(float).tiny)).max())
+        return float(max(errors))
 
 
 def _slider(name: str, unit: str, numbers: FloatArray) -> dict[str, Any]:

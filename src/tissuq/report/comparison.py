@@ -140,16 +140,16 @@ def comparison_result(table: pd.DataFrame, runs: list[str], unit: StressUnit) ->
     answer = Picture("answer", lambda: _parameter_figure(table, unit), "The parameter of every fit",
                      "95 % interval and median of the parameter; that of the largest evidence is on top.")  # fmt: skip
     excluding = (
-        "Where the intervals of the parameter exclude each other, the choice of discrepancy matters more than the "
-        "noise: read what each fit's own report says of its share of the initial stiffness."
+        "Where the intervals of the parameter exclude each other, the choice of material and discrepancy matters more "
+        "than the noise: read what each fit's own report says of its use."
     )
     return Result(
         command=command,
         title="Fits of the same measurements, side by side",
         subject=f"{len(table)} fits",
         numbers=_numbers(table, unit),
-        next_step="before you take one of these numbers, read in its own report what its discrepancy does to the "
-        "initial stiffness.",
+        next_step="before you take one of these numbers, read in its own report what it may be used for, and what a "
+        "discrepancy does to the initial stiffness.",
         picture=answer,
         tables=(comparison_table(table, unit),),
         sections=(Section("Evidence, prediction and parameter", (figure,)),

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
+from tissuq.experiments.units import stress_unit
+from tissuq.model.noise import UnknownNoise
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.ranking import TIED
 from tissuq.next_test.targets import Target
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from tissuq.model.statistical_model import StatisticalModel
 
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
@@ -73,10 +77,22 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     default = {name: SpecimenSettings.model_fields[name].default for name in ("material", "discrepancies")}
     fitted = f" --material {model.material.name}" * (model.material.name != default["material"])
     fitted += f" --discrepancy {model.discrepancy.name}" * ((model.discrepancy.name,) != default["discrepancies"])
-    sds = {f"{sd / study.unit.to_mpa:.4g}" for sd in model.noise.of_tests(model.experiment)}
-    fitted += f" --noise-sd {min(sds)}" * (len(sds) == 1 and not model.noise.parameters)
-    test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=fitted + modes + errors)
+    options = fitted + modes + _noise_option(model) + errors
+    test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=options)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
+
+
+def _noise_option(model: StatisticalModel) -> str:
+    """Return the option for the noise of the fit, which the new test has, too; empty where nothing need be said."""
+    noise, tests = model.noise, model.experiment.tests
+    if noise.parameters:
+        return f" --noise {noise.name}" * (noise.name != UnknownNoise.name)
+    sds = noise.of_tests(model.experiment) * np.sqrt([test.curves[0].averaged for test in tests])
+    units = [stress_unit(test.stress_unit).to_mpa for test in tests]
+    of_new = np.exp(np.log(sds).mean()) / units[0]
+    is_one_for_all = len({*zip(sds, units, strict=True)}) == 1
+    of_each = [of_new] if is_one_for_all else [*(sds / units), of_new]
+    return " --noise-sd " + ",".join(f"{sd:g}" for sd in of_each)
 
 
 def design_table(study: DesignStudy, target: Target, limit: int | None = None) -> Table:

@@ -116,9 +116,12 @@ def noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str
         of_lag = f" (lag-1 correlation {lag:.2f})" if lag else ""
         return f"{noise.description}{of_lag}{_ratios_of_tests(posterior.model)}"
     values = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
-    sizes = ", ".join(f"{value:g}" for value in values) or f"{study.settings.noise_sd:g}"
+    units = [test.stress_unit for test in study.experiment.tests]
+    sizes = f"{', '.join(f'{value:g}' for value in values) or f'{study.settings.noise_sd:g}'} {units[0]}"
+    if len({*units}) > 1:
+        sizes = ", ".join(f"{value:g} {unit}" for value, unit in zip(values, units, strict=True))
     of_means = " of single measurements, of means that over the root of their number"
-    return f"sd {sizes} {study.experiment.stress_unit}{of_means * (study.experiment.averaged_at_most > 1)}"
+    return f"sd {sizes}{of_means * (study.experiment.averaged_at_most > 1)}"
 
 
 def _ratios_of_tests(model: StatisticalModel) -> str:

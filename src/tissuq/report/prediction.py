@@ -24,7 +24,7 @@ from tissuq.report.inputs import Copies
 from tissuq.report.measured import named
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import uses_of
-from tissuq.report.summary import SAME_STATES
+from tissuq.report.summary import SAME_STATES, SCORES
 from tissuq.report.tables import interval, significant, table_files
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
     from tissuq.studies.run_settings import PredictionSettings
 
-SCORES = ("crps", "interval_score")
-"""Columns that are stresses."""
 NOT_COMPRESSED = " No test was in compression, which counts as measured where it deforms the tissue as the tests did."
 
 

@@ -44,6 +44,8 @@ STABLE_MEANS = (
     "compression or tension: median and 95 % interval of the draws that become unstable, if stability is lost with a "
     "probability above 5 %."
 )
+SCORES = ("crps", "interval_score")
+"""Scores of a prediction that are stresses."""
 OF_HEADLINE = ("median", "hdi_low", "hdi_high")
 """What is said of the headline parameter from the other tests."""
 HELD_OUT_NOTE = (
@@ -227,8 +229,8 @@ def stability_section(rows: list[Row]) -> Section:
 
 
 def held_out_files(rows: Sequence[Row], headline: str, unit: StressUnit) -> dict[str, list[Row]]:
-    """Return the rows, whose headline parameter is in MPa, as files in a unit."""
-    return table_files("held_out", rows, [f"{headline}_{name}" for name in OF_HEADLINE], unit)
+    """Return the rows, whose scores and headline parameter are in MPa, as files in a unit."""
+    return table_files("held_out", rows, [*SCORES, *(f"{headline}_{name}" for name in OF_HEADLINE)], unit)
 
 
 def held_out_table(rows: Sequence[Row], headline: str, unit: StressUnit) -> Table:

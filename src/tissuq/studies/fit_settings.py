@@ -135,20 +135,42 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         return {self.material: own.get(self.material) or material_named(self.material)}
 
     def experiment(self, folder: Path = Path(), found: Sequence[Reading | None] = ()) -> Experiment:
-        """Read the measurements, of all tests together, unless they are found."""
+        """Read the measurements, of all tests together, unless they are found.
+
+        Raises
+        ------
+        InputError
+            When they cannot be read, or have several units of stress where the settings state a stress in "the" unit.
+        """
         from tissuq.experiments.experiment import Experiment
         from tissuq.experiments.reading.findings import experiment_of
+        from tissuq.experiments.units import stress_unit
+        from tissuq.model.tolerances import Tolerances
 
-        return Experiment.of(list(map(experiment_of, self.readings(folder, found))))
+        tests = list(map(experiment_of, self.readings(folder, found)))
+        units = {stress_unit(test.stress_unit).to_mpa: test.stress_unit for test in tests}
+        stated = {
+            "noise, unless each test has its own,": self.noise_sd != "unknown",
+            "priors": bool(self.priors),
+            "tolerances": any(error.is_stress for error, _ in Tolerances(**(self.tolerances or {}))),
+        }
+        if len(units) > 1 and any(stated.values()):
+            raise InputError(
+                f"the files give stresses in different units ({', '.join(units.values())}), so that the unit of the "
+                f"{' and '.join(name for name, is_stated in stated.items() if is_stated)} is ambiguous: convert the "
+                "files to one unit."
+            )
+        return Experiment.of(tests)
 
-    def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise, known standard deviations converted from a unit to MPa."""
+    def noise_in(self, *units: StressUnit) -> Noise:
+        """Return the noise, known standard deviations converted to MPa from the unit of each test, or that of all."""
         from tissuq.model.noise import noise_named
 
         values = [test.noise_sd for test in self.tests if test.noise_sd is not None]
         if values:
-            return noise_named([value * unit.to_mpa for value in values])
-        return super().noise_in(unit)
+            of_tests = units if len(units) > 1 else units * len(values)
+            return noise_named([value * unit.to_mpa for value, unit in zip(values, of_tests, strict=True)])
+        return super().noise_in(*units)
 
 
 class LawSettings(SpecimenSettings):

@@ -14,7 +14,7 @@ from tissuq.assessment.uses import MIN_OFTEN_STABLE
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
@@ -117,7 +117,7 @@ def run_laws(
         When file or settings cannot be used, or a law that was named cannot be fitted.
     """
     experiment = settings.experiment(folder, found)
-    unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
+    (discrepancy,) = settings.discrepancies
     laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
     one_a_core = 1 if len(laws) < MIN_DIVIDED else os.cpu_count() or 1
     processes = 1 if any(map(LAW.search, settings.laws)) else min(workers or one_a_core, len(laws))
@@ -129,7 +129,7 @@ def run_laws(
             priors=priors_in_mpa(settings, laws.values(), experiment),
             step=step,
             pool=pool,
-            **shared_options(settings, unit),
+            **shared_options(settings, experiment),
         )
     fitted_experiment = next(iter(comparison.fits.values())).model.experiment
     return LawStudy(settings, fitted_experiment, comparison)

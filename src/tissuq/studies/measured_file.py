@@ -233,12 +233,23 @@ class FittedSettings(Settings):
             raise ValueError(f"give noise_sd or noise, not both (noise_sd is {self.noise_sd}, noise is '{self.noise}')")
         return self
 
-    def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise of all, a known standard deviation converted from a unit to MPa."""
+    @model_validator(mode="after")
+    def _one_set_of_errors(self) -> Self:
+        from tissuq.model.tolerances import AS_TESTED
+
+        if self.tolerances == {} and self.estimand not in (None, AS_TESTED):
+            raise ValueError(
+                f"the tolerance is none, and the estimand '{self.estimand}' has errors of the tests: give one of them "
+                f"('{AS_TESTED}' has no errors)"
+            )
+        return self
+
+    def noise_in(self, *units: StressUnit) -> Noise:
+        """Return the noise of all, a known standard deviation converted from their unit, the first, to MPa."""
         from tissuq.model.noise import noise_named
 
         if isinstance(self.noise_sd, float):
-            return noise_named(self.noise_sd * unit.to_mpa)
+            return noise_named(self.noise_sd * units[0].to_mpa)
         return noise_named(self.noise or "unknown")
 
     def tolerances_in(self, unit: StressUnit) -> Tolerances | dict[str, float] | None:

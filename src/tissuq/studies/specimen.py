@@ -133,7 +133,6 @@ def run_specimen(
     """
     experiment = settings.experiment(folder, found)
     (material,) = settings.fitted_laws({settings.material: law} if law else {}).values()
-    unit = stress_unit(experiment.stress_unit)
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
     check_priors(settings, chain.from_iterable(symbols.values()))
@@ -148,7 +147,7 @@ def run_specimen(
             )
             continue
         try:
-            options = _options(settings, material, symbols[name], unit)
+            options = _options(settings, material, symbols[name], experiment)
             posteriors[name] = fit(experiment, discrepancy=name, **options)
             seconds[name] = perf_counter() - start
         except (ConvergenceError, ModelError) as error:
@@ -175,7 +174,7 @@ def run_specimen(
                 "this discrepancy is a separate error of the stress in each test."
             )
             continue
-        options = _options(settings, material, symbols[name], unit)
+        options = _options(settings, material, symbols[name], experiment)
         fitted = posteriors[name].model
         options |= {"tolerances": fitted.tolerances, "discrepancy": fitted.discrepancy}
         try:
@@ -201,22 +200,24 @@ def fitted(
         As `run_specimen`.
     """
     experiment = settings.experiment(folder)
-    material, unit = law or material_named(settings.material), stress_unit(experiment.stress_unit)
+    material = law or material_named(settings.material)
     parameters = parameters_of(settings, material, discrepancy, experiment)
-    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, parameters, unit))
+    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, parameters, experiment))
 
 
 def _options(
-    settings: SpecimenSettings, material: Material, parameters: Iterable[Parameter], unit: StressUnit
+    settings: SpecimenSettings, material: Material, parameters: Iterable[Parameter], experiment: Experiment
 ) -> dict[str, Any]:
     """Return the options of a fit but the discrepancy."""
-    return {"material": material, "priors": _priors(settings, parameters, unit), **shared_options(settings, unit)}
+    priors = _priors(settings, parameters, stress_unit(experiment.stress_unit))
+    return {"material": material, "priors": priors, **shared_options(settings, experiment)}
 
 
-def shared_options(settings: SpecimenSettings, unit: StressUnit) -> dict[str, Any]:
+def shared_options(settings: SpecimenSettings, experiment: Experiment) -> dict[str, Any]:
     """Return the options of a fit that do not depend on material and discrepancy."""
     stated = {name: getattr(settings, name) for name in ("method", "stable_in", "seed")}
-    return {"noise": settings.noise_in(unit), "tolerances": settings.tolerances_in(unit), **stated}
+    units = [stress_unit(test.stress_unit) for test in experiment.tests]
+    return {"noise": settings.noise_in(*units), "tolerances": settings.tolerances_in(units[0]), **stated}
 
 
 def _names(settings: SpecimenSettings) -> list[str]:
@@ -290,7 +291,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     -------
     pandas.DataFrame
         One row a test, as `prediction_of` describes it, and median and 95 % interval of the headline parameter from the
-        others, MPa.
+        others; stresses, scores included, in MPa.
 
     Raises
     ------

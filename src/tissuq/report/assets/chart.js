@@ -29,7 +29,9 @@
   };
   // As text elsewhere: an exponent below 0.0001, where leading zeros cannot be counted.
   const plain = value => (value && Math.abs(value) < 1e-4 ? value.toExponential() : String(value)).replace(/e([+-])(\d)$/, "e$10$2");
-  const number = value => value == null || !Number.isFinite(value) ? "–" : plain(Number(value.toPrecision(3)));
+  const rounded = (value, digits) => value == null || !Number.isFinite(value) ? "–" : plain(Number(value.toPrecision(digits)));
+  const number = value => rounded(value, 3);
+  const stretch = value => rounded(value, 5); // of a stiff tissue hardly other than one
   const isMeasured = key => key === "measured" || key === "unloading";
   const isOn = key => parts.some(part => part.on && part.keys.includes(key));
 
@@ -46,9 +48,9 @@
     return column[low] == null || column[high] == null ? null : (1 - share) * column[low] + share * column[high];
   };
 
-  // Weights of the nodes of the exponent for its value: barycentric, for Chebyshev nodes of the second kind.
+  // Weights of the nodes of the exponent, or of its logarithm, for its value: barycentric, for Chebyshev nodes of the second kind.
   const nodeWeights = () => {
-    const nodes = data.nodes, value = values[values.length - 1], hit = nodes.indexOf(value);
+    const nodes = data.nodes, last = values[values.length - 1], value = data.is_logarithm ? Math.log(last) : last, hit = nodes.indexOf(value);
     if (!nodes.length) return [1];
     if (hit >= 0) return nodes.map((_, index) => Number(index === hit));
     const terms = nodes.map((node, index) => (index % 2 ? -1 : 1) * (index % (nodes.length - 1) ? 1 : 0.5) / (value - node));
@@ -158,7 +160,7 @@
   };
   const sentence = x => {
     const [low, high] = range(), value = key => number(at(column(key), x));
-    return `${test.control} ${number(x)}, in ${data.unit}: ` + measuredAt(x, (high - low) / 200) +
+    return `${test.control} ${stretch(x)}, in ${data.unit}: ` + measuredAt(x, (high - low) / 200) +
       `predicted ${value("median")}, 95 % of measurements ${value("low")} to ${value("high")}, ` +
       `95 % of the stress ${value("stress_low")} to ${value("stress_high")}` +
       (view.alone ? `, material alone ${value("alone")}` : "") + (isOn("yours") ? `, yours ${value("yours")}` : "");
@@ -167,14 +169,14 @@
     const [low, high] = range();
     if (!Number.isFinite(x)) return;
     if (x < low || x > high) {
-      readout.textContent = `${number(x)} is beyond ${number(low)} to ${number(high)}, the strains that were measured: ` +
+      readout.textContent = `${stretch(x)} is beyond ${stretch(low)} to ${stretch(high)}, the strains that were measured: ` +
         "tissuq predict goes further, and says how much of it is extrapolated.";
       return;
     }
     spot = x;
-    if (source !== typed) typed.value = Number(x.toPrecision(5));
+    if (source !== typed) typed.value = stretch(x);
     if (source !== slid) slid.value = x;
-    slid.setAttribute("aria-valuetext", number(x));
+    slid.setAttribute("aria-valuetext", stretch(x));
     readout.textContent = sentence(x);
     place();
   };
