@@ -17,6 +17,7 @@ def test_shares_are_computed_once_for_each_posterior_and_forgotten_with_it(monke
     solutions = [Posterior() for _ in range(30)]
     first = [shares.shares_of_discrepancy(solution) for solution in solutions]
     assert [shares.shares_of_discrepancy(solution) for solution in solutions] == first == list(range(1, 31))
+    gc.collect()  # of what other tests left
     before = len(shares._SHARES)
     computed.clear()
     solutions.clear()
