@@ -143,12 +143,12 @@ class Assessment:
             worst = max(self.shifts, key=lambda factor: abs(self.shifts[factor]))
             clauses.append(
                 f"the prior scale of {' and '.join(self.scales)} {_influence(self.shifts[worst])}: multiplied by "
-                f"{worst:g}, it shifts {self.parameter} by {self.shifts[worst]:+.2f} sd"
+                f"{worst:g}, it shifts {self.parameter} by {self.shifts[worst]:+z.2f} sd"
             )
         if self.stable:
             clauses.append(self._stability())
         if self.factors:
-            named = ", ".join(f"{name} {100 * (factor - 1):+.0f} %" for name, factor in self.factors.items())
+            named = ", ".join(f"{name} {100 * (factor - 1):+z.0f} %" for name, factor in self.factors.items())
             clauses.append(f"the stresses of the tests differ from those of their common material by {named}")
         if self.power_scaling is not None:
             clauses.append(self.power_scaling.sentence(self.parameter))

@@ -293,7 +293,7 @@ def _mesh(ensemble: ModelEnsemble) -> list[str]:
         ]
     ends = {name: changes[-1][1] for name, changes in ensemble.mesh_changes.items()}
     return [
-        f"On the finer mesh {name} at the end changes by {100 * change:+.1f} %: the mesh is too coarse for it."
+        f"On the finer mesh {name} at the end changes by {100 * change:+z.1f} %: the mesh is too coarse for it."
         for name, change in ends.items()
         if abs(change) >= MIN_MESH_CHANGE
     ]

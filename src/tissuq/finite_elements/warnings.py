@@ -115,5 +115,5 @@ def _coarse_mesh(simulation: Simulation) -> list[str]:
     change, travel = simulation.mesh_change
     return [
         f"On {simulation.finer_mesh} the {simulation.case.response} at {simulation.case.shown(travel)} "
-        f"changes by {100 * change:+.1f} %: the mesh is too coarse for it."
+        f"changes by {100 * change:+z.1f} %: the mesh is too coarse for it."
     ]

@@ -101,7 +101,7 @@ class Bands:
     @property
     def mesh_change(self) -> str:
         """By how much the last row changes for cells without size."""
-        return f"{100 * (self.mesh_ratio(self.last) - 1):+.1f} %"
+        return f"{100 * (self.mesh_ratio(self.last) - 1):+z.1f} %"
 
     @property
     def shares(self) -> list[str]:

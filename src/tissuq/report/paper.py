@@ -56,10 +56,10 @@ NOTE = (
 )
 AGREEMENT: dict[str, Callable[[Row], str]] = {
     "formulation": itemgetter("formulation"),
-    "mean": lambda row: f"{row['mean_shift_in_sd']:+.3f}",
+    "mean": lambda row: f"{row['mean_shift_in_sd']:+z.3f}",
     "sd ratio": lambda row: f"{row['sd_ratio']:.3f}",
-    "95 % low": lambda row: f"{row['hdi_low_shift_in_sd']:+.3f}",
-    "95 % high": lambda row: f"{row['hdi_high_shift_in_sd']:+.3f}",
+    "95 % low": lambda row: f"{row['hdi_low_shift_in_sd']:+z.3f}",
+    "95 % high": lambda row: f"{row['hdi_high_shift_in_sd']:+z.3f}",
     "R-hat": lambda row: f"{row['rhat']:.4f}",
     "ESS": lambda row: f"{row['ess']:.0f}",
     "converged": lambda row: "yes" if row["converged"] else "NO",

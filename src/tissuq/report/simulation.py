@@ -275,7 +275,7 @@ def _sections(study: SimulationStudy, bands: Bands) -> tuple[Section, ...]:
     change = simulation.mesh_change
     finer = (
         f" On {simulation.finer_mesh} the {case.response} of one draw at {case.shown(change[1])} changes "
-        f"by {100 * change[0]:+.1f} %."
+        f"by {100 * change[0]:+z.1f} %."
         if change
         else f" How far the {case.response} is off by the size of the cells is not known: compute it with a finer "
         "mesh, too (--finer-mesh)."

@@ -197,7 +197,7 @@ def volume_step(measured: MeasuredRows, *, is_taken: bool = False) -> str:
     change = np.exp(along[end] * (1 - 2 * ratio)) - 1
     raise InputError(
         f"{table.place(number)}: the specimen does not keep its volume ({said}; at stretch "
-        f"{np.exp(along[end]):.3g} it changes by {100 * change:+.0f} %), while every material here is incompressible: "
+        f"{np.exp(along[end]):.3g} it changes by {100 * change:+z.0f} %), while every material here is incompressible: "
         "its modulus would be wrong. Foams and lung need a compressible law in another tool. To fit it as one of "
         "constant volume all the same, give --incompressible."
     )
