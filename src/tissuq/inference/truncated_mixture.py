@@ -54,27 +54,29 @@ class TruncatedMixture:
     ----------
     gaussians : GaussianMixture
         Gaussian before the bounds cut them; weights after that.
-    touched : (M, p) array
-        Bounds of which parameters cut which component.
     box : Boxes
         The bounds (1, p).
     """
 
     gaussians: GaussianMixture
-    touched: BoolArray
     box: Boxes
 
-    @classmethod
-    def of(cls, gaussians: GaussianMixture, mass_beyond: FloatArray, box: Boxes) -> TruncatedMixture:
-        """Return Gaussians with weights after the cut, given the masses (M, p) beyond the bounds of each parameter.
+    @cached_property
+    def mass_beyond(self) -> FloatArray:
+        """The masses (M, p) of the Gaussians beyond the bounds of each parameter."""
+        return self.box.beyond(self.gaussians.mean, self.gaussians.root)
+
+    @cached_property
+    def touched(self) -> BoolArray:
+        """Bounds of which parameters cut which component (M, p).
 
         Components that together have less than 1e-8 of the posterior outside the bounds count as free.
         """
-        loss = gaussians.weights * mass_beyond.sum(axis=1)
+        loss = self.gaussians.weights * self.mass_beyond.sum(axis=1)
         order = np.argsort(loss)
         is_cut = np.zeros(len(loss), dtype=bool)
         is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE_MASS]] = True
-        return cls(gaussians, is_cut[:, None] & (mass_beyond > TOUCHED_MASS), box)
+        return is_cut[:, None] & (self.mass_beyond > TOUCHED_MASS)
 
     @property
     def is_cut(self) -> bool:
@@ -103,6 +105,25 @@ class TruncatedMixture:
         number = min(MIN_DRAWS, count or MIN_DRAWS)
         are_cut = [self._drawn(gaussians, number) for gaussians in (*self.cut.values(), self.crossed) if len(gaussians)]
         return GaussianMixture.of_all([self.free, *are_cut], count)
+
+    def checked_masses(self, symbols: Sequence[str]) -> tuple[FloatArray, float]:
+        """Return the log masses within bounds of the components that these cut notably, and the error of all.
+
+        Raises
+        ------
+        ConvergenceError
+            When they are not known well enough; the message has the symbols of the parameters.
+        """
+        weights, outside = self.gaussians.weights, self.mass_beyond.sum(axis=1)
+        heavy = self.gaussians[(weights > HEAVY_SHARE) & (outside > HEAVY_SHARE)]
+        log_mass, error = self._boxes(heavy).log_mass(heavy.mean, heavy.root)
+        error_of_mass = float(heavy.weights @ error + weights @ np.minimum(outside, HEAVY_SHARE))
+        if error_of_mass > MAX_LOG_MASS_ERROR:
+            raise ConvergenceError(
+                f"bounds of several linear parameters ({', '.join(symbols)}) cut so deep that the mass "
+                "within them is not known well enough; use the method 'joint', or wider priors."
+            )
+        return log_mass, error_of_mass
 
     def marginal(self, index: int, most: int = MAX_COMPONENTS) -> Marginal:
         """Return the marginal of one linear parameter: in closed form where at most one bound cuts.
@@ -157,39 +178,6 @@ class TruncatedMixture:
         log_shares, points = self._boxes(gaussians).points(gaussians.mean, gaussians.root, number)
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         return _of_points(gaussians, shares / shares.sum(axis=1, keepdims=True), points)
-
-
-def checked_masses(
-    symbols: Sequence[str], mixture: GaussianMixture, mass_outside: FloatArray, box: Boxes
-) -> tuple[FloatArray, float]:
-    """Return the log masses within bounds of the components that these cut notably, and the error of all.
-
-    Parameters
-    ----------
-    symbols : sequence of str
-        The parameters.
-    mixture : GaussianMixture
-        Weights after the bounds have cut.
-    mass_outside : (M, p) array
-        Of each component beyond the bounds of each parameter.
-    box : Boxes
-        The bounds (1, p).
-
-    Raises
-    ------
-    ConvergenceError
-        When they are not known well enough.
-    """
-    weights, outside = mixture.weights, mass_outside.sum(axis=1)
-    heavy = np.flatnonzero((weights > HEAVY_SHARE) & (outside > HEAVY_SHARE))
-    log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
-    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(outside, HEAVY_SHARE))
-    if error_of_mass > MAX_LOG_MASS_ERROR:
-        raise ConvergenceError(
-            f"bounds of several linear parameters ({', '.join(symbols)}) cut so deep that the mass "
-            "within them is not known well enough; use the method 'joint', or wider priors."
-        )
-    return log_mass, error_of_mass
 
 
 def _of_points(gaussians: GaussianMixture, shares: FloatArray, points: FloatArray) -> GaussianMixture:

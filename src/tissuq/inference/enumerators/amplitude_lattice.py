@@ -187,8 +187,7 @@ class _EnergySums:
         self._shares = np.bincount(self._node, self._weights, minlength=len(nodes))
         settings = self._settings(points, self._node)
         gaussians = GaussianMixture(self._weights, settings, mean, root).resampled(MAX_MARGINAL_POINTS)
-        outside_of_few = self._box.beyond(gaussians.mean, gaussians.root)
-        self._truncated = TruncatedMixture.of(gaussians, outside_of_few, self._box)
+        self._truncated = TruncatedMixture(gaussians, self._box)
         self._mass_outside = mass_outside.sum(axis=1)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
@@ -270,7 +269,7 @@ class _EnergySums:
         mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
-        return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components(few)
+        return TruncatedMixture(mixture, box).components(few)
 
     def _marginal(self, components: int, symbol: str) -> Marginal:
         if symbol in self.model.linear:
