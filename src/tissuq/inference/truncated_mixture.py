@@ -185,7 +185,7 @@ def _of_points(gaussians: GaussianMixture, shares: FloatArray, points: FloatArra
     weights = (gaussians.weights[:, None] * shares).ravel()
     rows, p = np.repeat(np.arange(len(points)), points.shape[1]), points.shape[2]
     member = None if gaussians.member is None else gaussians.member[rows]
-    return GaussianMixture.of_points(weights, gaussians.settings[rows], points.reshape(-1, p), member)
+    return GaussianMixture.of_points(gaussians.settings[rows], points.reshape(-1, p), member).weighted(weights)
 
 
 def _marginal_of_cut(gaussians: GaussianMixture, index: int, cut_index: int, ends: tuple[float, float]) -> Marginal:

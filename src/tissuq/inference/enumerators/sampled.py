@@ -215,8 +215,7 @@ class _ConditionalDraws:
 def _points(settings: FloatArray, linear: FloatArray) -> GaussianMixture:
     """Return draws (chains, draws, d) and (chains, draws, p) as points of the same weight."""
     count = settings.shape[0] * settings.shape[1]
-    weights = np.full(count, 1 / count)
-    return GaussianMixture.of_points(weights, settings.reshape(count, -1), linear.reshape(count, -1))
+    return GaussianMixture.of_points(settings.reshape(count, -1), linear.reshape(count, -1))
 
 
 def _solution(
