@@ -23,7 +23,6 @@ from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat
 
 POINTS_PER_PARAMETER = 256
 """Points of a round for each parameter, about: their number is a power of two."""
@@ -124,7 +123,7 @@ class AdaptedPoints:
             truncated.components,
             seed,
         )
-        if any(isinstance(prior, Flat) for prior in model.priors.values()):
+        if model.is_improper:
             return solution
         _, error_of_mass = truncated.checked_masses(model.linear)
         error = float(np.sqrt(1 / number - 1 / len(log_weights))) + error_of_mass

@@ -35,7 +35,7 @@ from tissuq.inference.reduction import BasesOf, bases_of
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat, Prior
+from tissuq.parameters.priors import Prior
 
 DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
@@ -252,7 +252,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     solution = Solution(
         model, "exact", f"{linear}; {integrated}{cut}", truncated.components, Marginals.of(model, marginal), seed=seed
     )
-    if any(isinstance(prior, Flat) for prior in model.priors.values()):
+    if model.is_improper:
         return solution
     log_mass, error_of_mass = truncated.checked_masses(model.linear)
     if rule:

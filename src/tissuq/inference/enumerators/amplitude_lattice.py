@@ -36,7 +36,7 @@ from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat, Prior
+from tissuq.parameters.priors import Prior
 
 MAX_PRIOR_MASS_ERROR = 0.01
 """Error of the mass of an amplitude's prior, summed on every second point, up to which the lattice serves it."""
@@ -190,7 +190,7 @@ class _EnergySums:
         self._truncated = TruncatedMixture(gaussians, self._box)
         self._mass_outside = mass_outside.sum(axis=1)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
-        if not any(isinstance(prior, Flat) for prior in model.priors.values()):
+        if not model.is_improper:
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
             # Nodes far from the posterior may end within large amplitudes: what is unknown there does not matter.
             matters = self._shares > NEGLIGIBLE_SHARE
