@@ -13,6 +13,7 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import (
+    FEW_GAUSSIANS,
     MIXTURE_NODES,
     HermiteCubics,
     Marginal,
@@ -32,8 +33,6 @@ MAX_COMPONENTS = 200
 """Components, at most, whose marginals within several bounds are computed."""
 POINTS_PER_COMPONENT = 1000
 """Points for each of so many components, that stand for all together where more bounds cut than can be integrated."""
-FEW_GAUSSIANS = 60
-"""Up to which Gaussians that are nearly the same are not merged."""
 SAME_GAUSSIAN = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MAX_VALUES = 300_000
