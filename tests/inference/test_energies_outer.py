@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import tissuq as tq
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.nodes import Guide
 from tissuq.inference.enumerators.outer_search import relative_error, weighted_nodes
-from tissuq.inference.linear import times_gaussians
+from tissuq.inference.linear import LinearPriors
 from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, even_points, log_normal
 from tissuq.model.noise import stress_level
 
@@ -283,9 +284,8 @@ def test_a_product_with_gaussian_priors_is_that_of_precisions():
     generator = np.random.default_rng(0)
     root = generator.standard_normal((5, 3, 3))
     mean = generator.standard_normal((5, 3))
-    found, found_root, log_mass = times_gaussians(
-        mean, root, [tq.Normal(0.5, 0.3), tq.Uniform(-1, 1), tq.Normal(-1, 2)]
-    )
+    priors = {"a": tq.Normal(0.5, 0.3), "b": tq.Uniform(-1, 1), "c": tq.Normal(-1, 2)}
+    found, found_root, log_mass = LinearPriors(SimpleNamespace(linear=[*priors], priors=priors)).times(mean, root)
     for k in range(5):
         before = np.linalg.inv(root[k] @ root[k].T)
         precision = before + np.diag([0.3**-2, 0, 2.0**-2])

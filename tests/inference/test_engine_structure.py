@@ -142,7 +142,8 @@ def test_designs_are_reduced_at_once_as_one_by_one(terms):
     designs = np.array([found.rows(found.basis(found.states, setting)) for setting in settings])
     at_once = _of_independent_errors([found, other], designs)
     for reduction, design in zip(at_once, designs, strict=True):
-        (alone,) = _reduced(found, _Fit.of([found, other], design), [()])  # each level of the stress by itself
+        (fit,) = _Fit.of([found, other], design[None])
+        (alone,) = _reduced(found, fit, [()])  # each level of the stress by itself
         np.testing.assert_allclose(reduction.squares[:, 0], alone.squares.sum(axis=1), rtol=1e-9, atol=1e-12)
         assert reduction.counts.sum() == alone.counts.sum()
         for name in ("inverse", "log_size", "centre"):

@@ -43,8 +43,7 @@ def test_what_a_bound_cuts_counts_in_the_marginal_though_it_weighs_little(share)
     """A Gaussian far from the bound, and half of one at it, whose mean is 100 sqrt(2 / pi)."""
     free = GaussianMixture(np.array([1 - share]), np.zeros((1, 0)), np.array([[1000.0]]), np.array([[[1.0]]]))
     cut = GaussianMixture(np.array([share]), np.zeros((1, 0)), np.array([[0.0]]), np.array([[[100.0]]]))
-    touched = np.array([[False], [True]])
-    found = TruncatedMixture(GaussianMixture.of_all([free, cut]), touched, boxes([0.0], [np.inf])).marginal(0)
+    found = TruncatedMixture(GaussianMixture.of_all([free, cut]), boxes([0.0], [np.inf])).marginal(0)
     at_bound = 100 * np.sqrt(2 / np.pi)
     assert found.mean == pytest.approx((1 - share) * 1000 + share * at_bound, rel=1e-7)
     assert found.quantile(share / 2) < 500 < found.quantile(1.5 * share)
@@ -113,8 +112,7 @@ def test_cut_parts_of_very_different_widths_have_a_marginal_together():
     """A narrow part, far from most of the places at which a wide one is tabulated, made them no number."""
     root = np.array([[[1.0, 0.0], [0.5, 0.8]], [[1e-12, 0.0], [5e-13, 8e-13]]])
     parts = GaussianMixture(np.array([0.5, 0.5]), np.zeros((2, 0)), np.zeros((2, 2)), root)
-    touched = np.array([[False, True], [False, True]])
-    marginal = TruncatedMixture(parts, touched, boxes([-np.inf, 0.0], [np.inf, np.inf])).marginal(0)
+    marginal = TruncatedMixture(parts, boxes([-np.inf, 0.0], [np.inf, np.inf])).marginal(0)
     assert np.isfinite(marginal.density).all()
     assert marginal.mean == pytest.approx(0.5 * 0.5 / np.hypot(0.5, 0.8) * np.sqrt(2 / np.pi), rel=1e-6)
     assert np.isfinite(marginal.hdi()).all()
@@ -125,7 +123,7 @@ def test_a_part_that_bounds_cut_and_that_hardly_weighs_is_kept_without_harm():
     weights = np.array([1 - 7e-8, 7e-8])
     mean, root = np.array([[9.0, 9.0], [0.5, 0.5]]), np.repeat(np.eye(2)[None], 2, axis=0)
     parts = GaussianMixture(weights, np.zeros((2, 0)), mean, root)
-    found = TruncatedMixture.of(parts, box.beyond(mean, root), box)
+    found = TruncatedMixture(parts, box)
     assert len(found.crossed.weights) == 1
     for place in range(2):
         assert found.marginal(place).mean == pytest.approx(9.0, abs=1e-6)

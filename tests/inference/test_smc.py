@@ -211,7 +211,7 @@ SMALL = Line(2, noise=0.1, half_width=30.0)
 
 @pytest.fixture(scope="module")
 def small_program():
-    return compiled_program(SMALL.log_likelihood, flat, tuple(SMALL.lower), tuple(SMALL.upper))
+    return compiled_program(SMALL.log_likelihood, flat, Box(SMALL.lower, SMALL.upper))
 
 
 @pytest.fixture

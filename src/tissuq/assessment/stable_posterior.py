@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tissuq.arrays import FloatArray, IndexArray
 from tissuq.assessment.stability import are_stable
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
@@ -121,7 +120,7 @@ def _stable_draws(
         component, linear = source.draw(int(generator.integers(2**32)))
         rows = component.ravel()
         member = None if source.member is None else source.member[rows]
-        points = _as_points(source.settings[rows], linear.reshape(len(rows), -1), member)
+        points = GaussianMixture.of_points(source.settings[rows], linear.reshape(len(rows), -1), member)
         stable = are_stable(unconstrained.model, points, paths)
         batches.append(points[stable])
         draw_count, stable_count = draw_count + component.size, stable_count + int(stable.sum())
@@ -138,11 +137,6 @@ def _stable_draws(
     return draws.weighted(np.full(stable_count, 1 / stable_count)), draw_count
 
 
-def _as_points(settings: FloatArray, linear: FloatArray, member: IndexArray | None = None) -> GaussianMixture:
-    """Return draws (M, d) and (M, p) as components without width."""
-    return GaussianMixture.of_points(np.full(len(linear), 1 / len(linear)), settings, linear, member)
-
-
 def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Generator) -> GaussianMixture:
     """Return draws of every parameter, and of the weights of an energy discrepancy, from their priors."""
     values = {symbol: np.asarray(prior.quantile(generator.random(count))) for symbol, prior in model.priors.items()}
@@ -151,7 +145,7 @@ def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Gener
         for symbols in (model.nonlinear, model.linear)
     )
     if not model.energy_members:
-        return _as_points(settings, linear)
+        return GaussianMixture.of_points(settings, linear)
     sizes = [[features.shape[1] for features in model.energy_features(k)] for k in range(len(model.energy_members))]
     odds = [member.probability for member in model.energy_members]
     member = generator.choice(len(odds), count, p=np.array(odds) / sum(odds))
@@ -161,4 +155,4 @@ def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Gener
         for block, size in zip(model.energy_members[index].amplitude_indices, sizes[index], strict=True):
             weights[rows, start : start + size] *= values[model.energy_symbols[block]][rows, None]
             start += size
-    return _as_points(settings, np.hstack([linear, weights]), member)
+    return GaussianMixture.of_points(settings, np.hstack([linear, weights]), member)

@@ -118,16 +118,15 @@ def columns_of(count: int) -> int:
 def on_figure(figure: Figure, count: int, columns: int, *, has_strips: bool = False) -> Panels:
     """Return panels on an empty figure, row by row."""
     down = ceil(count / columns)
-    if not has_strips:
-        grid = figure.add_gridspec(down, columns)
-        return Panels([figure.add_subplot(grid[divmod(number, columns)]) for number in range(count)])
-    grid = figure.add_gridspec(2 * down, columns, height_ratios=[1.0, STRIP_SHARE] * down)
+    heights = [1.0, STRIP_SHARE] if has_strips else [1.0]
+    grid = figure.add_gridspec(len(heights) * down, columns, height_ratios=heights * down)
     axes, strips = list[Any](), list[Any]()
     for number in range(count):
         row, column = divmod(number, columns)
-        axes.append(figure.add_subplot(grid[2 * row, column]))
-        strips.append(figure.add_subplot(grid[2 * row + 1, column], sharex=axes[-1]))
-        axes[-1].tick_params(labelbottom=False)
+        axes.append(figure.add_subplot(grid[len(heights) * row, column]))
+        if has_strips:
+            strips.append(figure.add_subplot(grid[2 * row + 1, column], sharex=axes[-1]))
+            axes[-1].tick_params(labelbottom=False)
     return Panels(axes, strips)
 
 

@@ -63,7 +63,7 @@ def material_posterior(
         np.array([by_symbol[symbol] for symbol in group]).reshape(-1, chains * count).T
         for group in (model.nonlinear, model.linear)
     )
-    mixture = GaussianMixture.of_points(np.full(chains * count, 1 / (chains * count)), settings, linear)
+    mixture = GaussianMixture.of_points(settings, linear)
     marginals = {symbol: _scaled(sampled.marginals[symbol], factors[symbol]) for symbol in symbols}
     ess = {symbol: float(sampled.ess[symbol]) for symbol in symbols}
     rhat = {symbol: float(sampled.rhat.get(symbol, np.nan)) for symbol in symbols}

@@ -82,6 +82,16 @@ class Box:
             fault = f"{self.lower[index]} is not below {self.upper[index]}"
             raise InputError(f"bounds {index}: {fault}; give lower < upper.")
 
+    def __eq__(self, value: object) -> bool:
+        return isinstance(value, Box) and self._ends == value._ends
+
+    def __hash__(self) -> int:
+        return hash(self._ends)
+
+    @property
+    def _ends(self) -> tuple[bytes, bytes]:
+        return self.lower.tobytes(), self.upper.tobytes()
+
     @property
     def has_lower(self) -> BoolArray:
         """Which coordinates have a lower bound."""
@@ -199,16 +209,12 @@ def log_density_on_line(log_density: Callable[..., Any], box: Box, *data: Any) -
 
 def derivatives_on_line(log_density: Callable[..., Any], box: Box, *data: Any) -> Derivatives:
     """Return the compiled value, gradient and Hessian of a box's log density, given data, on the real line."""
-    compiled = _compiled_derivatives(log_density, tuple(box.lower.tolist()), tuple(box.upper.tolist()))
+    compiled = _compiled_derivatives(log_density, box)
     return lambda line: tuple(np.asarray(array) for array in compiled(line, *data))  # type: ignore[return-value]
 
 
 @lru_cache(maxsize=64)
-def _compiled_derivatives(
-    log_density: Callable[..., Any], lower: tuple[float, ...], upper: tuple[float, ...]
-) -> Callable[..., Any]:
-    box = Box(lower, upper)
-
+def _compiled_derivatives(log_density: Callable[..., Any], box: Box) -> Callable[..., Any]:
     def derivatives(line: Any, *data: Any) -> tuple[Any, Any, Any]:
         value_and_gradient = jax.value_and_grad(log_density_on_line(log_density, box, *data))
 

@@ -44,12 +44,10 @@ class GaussianMixture:
     member: IndexArray | None = None
 
     @classmethod
-    def of_points(
-        cls, weights: FloatArray, settings: FloatArray, values: FloatArray, member: IndexArray | None = None
-    ) -> GaussianMixture:
-        """Return points without extent: settings (M, d) and values (M, p) of the linear parameters."""
+    def of_points(cls, settings: FloatArray, values: FloatArray, member: IndexArray | None = None) -> GaussianMixture:
+        """Return points of one weight without extent: settings (M, d) and values (M, p) of the linear parameters."""
         count, p = values.shape
-        return cls(weights, settings, values, np.broadcast_to(0.0, (count, p, p)), member)
+        return cls(np.full(count, 1 / count), settings, values, np.broadcast_to(0.0, (count, p, p)), member)
 
     @classmethod
     def of_covariances(cls, weights: FloatArray, mean: FloatArray, covariance: FloatArray) -> GaussianMixture:

@@ -22,7 +22,6 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.box import Boxes
 from tissuq.inference.reduction import BasesOf, Reducer, Reduction, Spectrum, bases_of
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Prior
 
 MAX_FEW_PARAMETERS = 4
 """Linear parameters up to which NumPy's functions for matrices cost more than the entries one by one."""
@@ -288,7 +287,6 @@ class LinearPriors:
 
     Attributes
     ----------
-    priors : list of Prior
     supports : (p, 2) array
     box : Boxes
         Their bounds (1, p).
@@ -299,16 +297,31 @@ class LinearPriors:
     """
 
     def __init__(self, model: StatisticalModel) -> None:
-        self.priors = [model.priors[symbol] for symbol in model.linear]
-        self._forms = [prior.gaussian or (0.0, 0.0, 0.0) for prior in self.priors]
-        self.supports = np.reshape([prior.support for prior in self.priors], (-1, 2))
+        priors = [model.priors[symbol] for symbol in model.linear]
+        self._forms = [prior.gaussian or (0.0, 0.0, 0.0) for prior in priors]
+        self.supports = np.reshape([prior.support for prior in priors], (-1, 2))
         self.box = Boxes(self.supports[None, :, 0], self.supports[None, :, 1])
         self.is_gaussian = any(precision for _, precision, _ in self._forms)
         self.log_height = float(sum(height for _, precision, height in self._forms if not precision))
 
     def times(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return `times_gaussians` with these priors."""
-        return times_gaussians(mean, root, self.priors)
+        """Multiply Gaussians of these parameters, and perhaps more, by the priors; flat, uniform ones change nothing.
+
+        Parameters
+        ----------
+        mean, root : (M, q) and (M, q, q) arrays
+
+        Returns
+        -------
+        Means (M, q), roots (M, q, q) and the logarithms (M,) of the masses.
+        """
+        log_mass = np.zeros(len(mean))
+        for index, (centre, precision, log_height) in enumerate(self._forms):
+            if not precision:
+                continue
+            mean, root, log_factor = _times_gaussian(mean, root, index, centre, precision)
+            log_mass += log_height + log_factor
+        return mean, root, log_mass
 
     def log_mass(self, mean: FloatArray, root: FloatArray) -> FloatArray:
         """Return the log mass (M,) of Gaussians (M, p) times all these priors but uniform densities, within bounds."""
@@ -327,31 +340,6 @@ class LinearPriors:
         is_free = np.array([not precision for _, precision, _ in self._forms], dtype=bool)
         wanted = np.clip(np.where(is_free, mean, centre), low, high)
         return np.asarray(((mean - wanted) ** 2 / variance).sum(axis=1))
-
-
-def times_gaussians(
-    mean: FloatArray, root: FloatArray, priors: Sequence[Prior]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Multiply Gaussians of linear parameters, and perhaps more, by the priors of the former.
-
-    Parameters
-    ----------
-    mean, root : (M, q) and (M, q, q) arrays
-    priors : sequence of Prior
-        Of the first parameters; flat and uniform ones change nothing.
-
-    Returns
-    -------
-    Means (M, q), roots (M, q, q) and the logarithms (M,) of the masses.
-    """
-    log_mass = np.zeros(len(mean))
-    for index, prior in enumerate(priors):
-        centre, precision, log_height = prior.gaussian or (0.0, 0.0, 0.0)
-        if not precision:
-            continue
-        mean, root, log_factor = _times_gaussian(mean, root, index, centre, precision)
-        log_mass += log_height + log_factor
-    return mean, root, log_mass
 
 
 def _times_gaussian(mean: Any, root: Any, index: int, centre: Any, precision: Any) -> tuple[Any, Any, Any]:

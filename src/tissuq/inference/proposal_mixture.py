@@ -72,7 +72,7 @@ def fitted(points: FloatArray, log_weights: FloatArray) -> Mixture:
         slices = np.argsort(np.argsort(points[:, axis])) * COMPONENTS // FITTED_POINTS
         shares = np.eye(COMPONENTS)[:, slices]
         for _ in range(FIT_STEPS):
-            gaussians = [_moved(points, share) for share in shares]
+            gaussians = [Proposal.of(points, share / share.sum()) for share in shares]
             heights = np.array([
                 np.log(share.mean()) + _log_gaussian(gaussian, points)
                 for share, gaussian in zip(shares, gaussians, strict=True)
@@ -80,7 +80,8 @@ def fitted(points: FloatArray, log_weights: FloatArray) -> Mixture:
             total = np.logaddexp.reduce(heights, axis=0)
             shares = np.maximum(np.exp(heights - total), 1e-3)
             shares /= shares.sum(axis=0)
-        fits.append((float(total.mean()), [(float(share.mean()), _moved(points, share)) for share in shares]))
+        parts = [(float(share.mean()), Proposal.of(points, share / share.sum())) for share in shares]
+        fits.append((float(total.mean()), parts))
     widths = WIDENED ** (1 / points.shape[1])
     _, mixture = max(fits, key=lambda fit: fit[0])
     return [(share, Proposal(gaussian.mean, widths * gaussian.root)) for share, gaussian in mixture]
@@ -96,12 +97,3 @@ def _log_gaussian(proposal: Proposal, points: FloatArray) -> FloatArray:
     """Return the log density (N,) of the Gaussian with mean and root of a proposal, at points (N, d)."""
     standard = np.asarray(np.linalg.solve(proposal.root, (points - proposal.mean).T).T, dtype=np.float64)
     return np.asarray(log_normal(standard) - np.log(np.abs(np.diag(proposal.root))).sum())
-
-
-def _moved(points: FloatArray, weights: FloatArray) -> Proposal:
-    """Return a proposal with the mean and the covariance of points (N, d) with weights (N,)."""
-    weights = weights / weights.sum()
-    mean = weights @ points
-    centred = points - mean
-    covariance = (weights[:, None] * centred).T @ centred + 1e-12 * np.eye(len(mean))
-    return Proposal(mean, np.asarray(np.linalg.cholesky(covariance)))

@@ -93,6 +93,14 @@ class Proposal:
     mean: FloatArray
     root: FloatArray
 
+    @classmethod
+    def of(cls, points: FloatArray, weights: FloatArray) -> Proposal:
+        """Return one with the mean and the covariance of points (N, d) with weights (N,), which sum to one."""
+        mean = weights @ points
+        centred = points - mean
+        covariance = (weights[:, None] * centred).T @ centred + 1e-12 * np.eye(len(mean))
+        return cls(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
+
     def points(self, uniforms: FloatArray) -> FloatArray:
         """Return the points (N, d) to which evenly spread points (N, d) of the unit cube lead."""
         from scipy.special import ndtri, stdtrit
@@ -201,10 +209,7 @@ def _search(
         ) - log(len(proposals))
         log_weights = np.nan_to_num(values - mixture, nan=LOG_OF_NOTHING, neginf=LOG_OF_NOTHING)
         weights, power = tempered(log_weights, least_effective)
-        mean = weights @ points
-        away = points - mean
-        covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
-        proposal = Proposal(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
+        proposal = Proposal.of(points, weights)
         effective_new = effective(values[-count:] - proposals[-1].log_density(new)) if power == 1 else 0.0
         is_found, number = effective_new > MIN_EFFECTIVE_SHARE * count, effective(log_weights)
         if min_effective is not None:

@@ -229,7 +229,8 @@ class Reducer:
 
     @cached_property
     def _fit(self) -> _Fit:
-        return _Fit.of(self._models, self._models[0].design)
+        (fit,) = _Fit.of(self._models, self._models[0].design[None])
+        return fit
 
     def _at(self, settings: Sequence[tuple[float, ...]]) -> list[Reduction]:
         """Reduce at settings of the structure; at many at once where the data are few."""
@@ -240,7 +241,7 @@ class Reducer:
             blocks_of_designs = _designs(model, settings, self._bases)
             if is_plain:
                 return [of_one for block in blocks_of_designs for of_one in _of_independent_errors(self._models, block)]
-            fits = (_Fit.of(self._models, design) for block in blocks_of_designs for design in block)
+            fits = (fit for block in blocks_of_designs for fit in _Fit.of(self._models, block))
             pairs = zip(fits, settings, strict=True)
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
         if is_plain and (len(self._models) == 1 or n > CHUNK):
@@ -267,22 +268,26 @@ class _Fit:
     """B data sets by least squares: the basis (n, q - 1) of the columns, and what is left of the stresses (B, n)."""
 
     inverse: FloatArray
-    log_size: float
+    log_size: Any
     centre: FloatArray
     shared: FloatArray
     residual: FloatArray
 
     @classmethod
-    def of(cls, models: Sequence[StatisticalModel], design: FloatArray) -> _Fit:
-        """Fit the columns of a design (n, k) that are integrated in closed form."""
+    def of(cls, models: Sequence[StatisticalModel], designs: FloatArray) -> _Fit:
+        """Fit the columns of designs (K, n, k) that are integrated in closed form; all arrays begin with K."""
         free, fixed = divided_columns(models[0])
-        basis, triangle = np.linalg.qr(design[:, free])
+        basis, triangle = np.linalg.qr(designs[:, :, free])
         inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
         stresses = np.array([model.stress for model in models])
-        centre = (stresses @ basis) @ inverse.T
-        residual = stresses - centre @ design[:, free].T
-        log_size = float(np.log(np.abs(np.diag(triangle))).sum())
-        return cls(inverse, log_size, centre, np.hstack([basis, design[:, fixed]]), residual)
+        centre = stresses @ basis @ inverse.swapaxes(1, 2)
+        residual = stresses - centre @ designs[:, :, free].swapaxes(1, 2)
+        log_size = np.log(np.abs(np.diagonal(triangle, 0, 1, 2))).sum(axis=1)
+        return cls(inverse, log_size, centre, np.concatenate([basis, designs[:, :, fixed]], axis=2), residual)
+
+    def __iter__(self) -> Iterator[_Fit]:
+        """Iterate over the fits of several designs."""
+        return (_Fit(*arrays) for arrays in zip(*vars(self).values(), strict=True))
 
     def reduction(
         self, squares: FloatArray, counts: FloatArray, values: FloatArray, levels: FloatArray | None = None
@@ -319,22 +324,13 @@ def _from_statistics(models: Sequence[StatisticalModel]) -> Reduction:
 
 def _of_independent_errors(models: Sequence[StatisticalModel], designs: FloatArray) -> list[Reduction]:
     """Reduce at designs (K, n, k), all at once, where all errors have one variance."""
-    free, fixed = divided_columns(models[0])
-    basis, triangle = np.linalg.qr(designs[:, :, free])
-    inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
-    stresses = np.array([model.stress for model in models])
-    centre = stresses @ basis @ inverse.swapaxes(1, 2)
-    residual = stresses - centre @ designs[:, :, free].swapaxes(1, 2)
-    shared = np.concatenate([basis, designs[:, :, fixed]], axis=2)
-    wide = np.broadcast_to(shared[:, None], (len(designs), len(models), *shared.shape[1:]))
-    columns = np.concatenate([wide, residual[..., None]], axis=3)
-    squares = (columns.swapaxes(2, 3) @ columns).reshape(*residual.shape[:2], 1, -1)
-    log_size = np.log(np.abs(np.diagonal(triangle, 0, 1, 2))).sum(axis=1)
+    fits = _Fit.of(models, designs)
+    wide = np.broadcast_to(fits.shared[:, None], (len(designs), len(models), *fits.shared.shape[1:]))
+    columns = np.concatenate([wide, fits.residual[..., None]], axis=3)
+    squares = (columns.swapaxes(2, 3) @ columns).reshape(*fits.residual.shape[:2], 1, -1)
     counts, zero = np.array([float(models[0].experiment.size)]), np.zeros(1)
-    return [
-        Reduction(inverse[index], float(log_size[index]), centre[index], squares[index], counts, zero, zero)
-        for index in range(len(designs))
-    ]
+    of_designs = zip(fits.inverse, fits.log_size, fits.centre, squares, strict=True)
+    return [Reduction(*of_design, counts, zero, zero) for of_design in of_designs]
 
 
 def _reduced(model: StatisticalModel, fit: _Fit, shapes: Sequence[tuple[float, ...]]) -> list[Reduction]:

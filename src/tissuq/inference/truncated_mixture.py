@@ -13,6 +13,7 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import (
+    FEW_GAUSSIANS,
     MIXTURE_NODES,
     HermiteCubics,
     Marginal,
@@ -32,8 +33,6 @@ MAX_COMPONENTS = 200
 """Components, at most, whose marginals within several bounds are computed."""
 POINTS_PER_COMPONENT = 1000
 """Points for each of so many components, that stand for all together where more bounds cut than can be integrated."""
-FEW_GAUSSIANS = 60
-"""Up to which Gaussians that are nearly the same are not merged."""
 SAME_GAUSSIAN = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MAX_VALUES = 300_000
@@ -54,27 +53,29 @@ class TruncatedMixture:
     ----------
     gaussians : GaussianMixture
         Gaussian before the bounds cut them; weights after that.
-    touched : (M, p) array
-        Bounds of which parameters cut which component.
     box : Boxes
         The bounds (1, p).
     """
 
     gaussians: GaussianMixture
-    touched: BoolArray
     box: Boxes
 
-    @classmethod
-    def of(cls, gaussians: GaussianMixture, mass_beyond: FloatArray, box: Boxes) -> TruncatedMixture:
-        """Return Gaussians with weights after the cut, given the masses (M, p) beyond the bounds of each parameter.
+    @cached_property
+    def mass_beyond(self) -> FloatArray:
+        """The masses (M, p) of the Gaussians beyond the bounds of each parameter."""
+        return self.box.beyond(self.gaussians.mean, self.gaussians.root)
+
+    @cached_property
+    def touched(self) -> BoolArray:
+        """Bounds of which parameters cut which component (M, p).
 
         Components that together have less than 1e-8 of the posterior outside the bounds count as free.
         """
-        loss = gaussians.weights * mass_beyond.sum(axis=1)
+        loss = self.gaussians.weights * self.mass_beyond.sum(axis=1)
         order = np.argsort(loss)
         is_cut = np.zeros(len(loss), dtype=bool)
         is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE_MASS]] = True
-        return cls(gaussians, is_cut[:, None] & (mass_beyond > TOUCHED_MASS), box)
+        return is_cut[:, None] & (self.mass_beyond > TOUCHED_MASS)
 
     @property
     def is_cut(self) -> bool:
@@ -103,6 +104,25 @@ class TruncatedMixture:
         number = min(MIN_DRAWS, count or MIN_DRAWS)
         are_cut = [self._drawn(gaussians, number) for gaussians in (*self.cut.values(), self.crossed) if len(gaussians)]
         return GaussianMixture.of_all([self.free, *are_cut], count)
+
+    def checked_masses(self, symbols: Sequence[str]) -> tuple[FloatArray, float]:
+        """Return the log masses within bounds of the components that these cut notably, and the error of all.
+
+        Raises
+        ------
+        ConvergenceError
+            When they are not known well enough; the message has the symbols of the parameters.
+        """
+        weights, outside = self.gaussians.weights, self.mass_beyond.sum(axis=1)
+        heavy = self.gaussians[(weights > HEAVY_SHARE) & (outside > HEAVY_SHARE)]
+        log_mass, error = self._boxes(heavy).log_mass(heavy.mean, heavy.root)
+        error_of_mass = float(heavy.weights @ error + weights @ np.minimum(outside, HEAVY_SHARE))
+        if error_of_mass > MAX_LOG_MASS_ERROR:
+            raise ConvergenceError(
+                f"bounds of several linear parameters ({', '.join(symbols)}) cut so deep that the mass "
+                "within them is not known well enough; use the method 'joint', or wider priors."
+            )
+        return log_mass, error_of_mass
 
     def marginal(self, index: int, most: int = MAX_COMPONENTS) -> Marginal:
         """Return the marginal of one linear parameter: in closed form where at most one bound cuts.
@@ -159,45 +179,12 @@ class TruncatedMixture:
         return _of_points(gaussians, shares / shares.sum(axis=1, keepdims=True), points)
 
 
-def checked_masses(
-    symbols: Sequence[str], mixture: GaussianMixture, mass_outside: FloatArray, box: Boxes
-) -> tuple[FloatArray, float]:
-    """Return the log masses within bounds of the components that these cut notably, and the error of all.
-
-    Parameters
-    ----------
-    symbols : sequence of str
-        The parameters.
-    mixture : GaussianMixture
-        Weights after the bounds have cut.
-    mass_outside : (M, p) array
-        Of each component beyond the bounds of each parameter.
-    box : Boxes
-        The bounds (1, p).
-
-    Raises
-    ------
-    ConvergenceError
-        When they are not known well enough.
-    """
-    weights, outside = mixture.weights, mass_outside.sum(axis=1)
-    heavy = np.flatnonzero((weights > HEAVY_SHARE) & (outside > HEAVY_SHARE))
-    log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
-    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(outside, HEAVY_SHARE))
-    if error_of_mass > MAX_LOG_MASS_ERROR:
-        raise ConvergenceError(
-            f"bounds of several linear parameters ({', '.join(symbols)}) cut so deep that the mass "
-            "within them is not known well enough; use the method 'joint', or wider priors."
-        )
-    return log_mass, error_of_mass
-
-
 def _of_points(gaussians: GaussianMixture, shares: FloatArray, points: FloatArray) -> GaussianMixture:
     """Return components without extent: points (M, R, p) that have shares (M, R) of the weights of M Gaussians."""
     weights = (gaussians.weights[:, None] * shares).ravel()
     rows, p = np.repeat(np.arange(len(points)), points.shape[1]), points.shape[2]
     member = None if gaussians.member is None else gaussians.member[rows]
-    return GaussianMixture.of_points(weights, gaussians.settings[rows], points.reshape(-1, p), member)
+    return GaussianMixture.of_points(gaussians.settings[rows], points.reshape(-1, p), member).weighted(weights)
 
 
 def _marginal_of_cut(gaussians: GaussianMixture, index: int, cut_index: int, ends: tuple[float, float]) -> Marginal:

@@ -105,6 +105,11 @@ class StatisticalModel(ErrorModel):
             for p in self.parameters
         }
 
+    @property
+    def is_improper(self) -> bool:
+        """Whether a prior is flat, so that there is no evidence."""
+        return any(isinstance(prior, Flat) for prior in self.priors.values())
+
     @cached_property
     def derived_parameters(self) -> tuple[Parameter, ...]:
         """Parameters of the material in the literature that follow from those of the model."""

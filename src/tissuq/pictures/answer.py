@@ -13,7 +13,7 @@ from tissuq.drawing.pieces import band, cut_off, line, points
 from tissuq.drawing.style import BAND, BASE, INK, MARKERS, STYLE, TRUTH, inline_svg, new_figure, relative_size
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
-from tissuq.pictures.curves import Described, is_determined, points_along, share_along, ways_of
+from tissuq.pictures.curves import Described, has_discrepancy, is_determined, points_along, share_along, ways_of
 from tissuq.prediction.bands import predict_band
 
 if TYPE_CHECKING:
@@ -34,11 +34,6 @@ LONG, SHORT = "engineering stress of", "stress of"
 """Words of the name of one of several stresses, which are long for an axis, and others."""
 SHARE_TICKS, MOST_SHARE = 3, 500
 """Ticks of a strip, and percent to which shares are cut: no renderer takes any number."""
-
-
-def has_shares(solution: Solution) -> bool:
-    """Return whether there is a discrepancy that may carry a share of the stress."""
-    return bool(solution.model.discrepancy.parameters)
 
 
 def answer(described: Sequence[Described], drawn: Panels, unit: StressUnit) -> None:
@@ -71,7 +66,7 @@ def answer_on_new_figure(described: Sequence[Described], unit: StressUnit, *, is
     letters = NARROW_LETTERS if is_narrow else WIDE_LETTERS
     style = STYLE | {"font.size": letters, "axes.titlesize": letters, "figure.dpi": PIXELS}
     with new_figure(width / PIXELS, tall / PIXELS, style) as figure:
-        drawn = on_figure(figure, count, columns, has_strips=has_shares(described[0].solution))
+        drawn = on_figure(figure, count, columns, has_strips=has_discrepancy(described[0].solution))
         answer(described, Panels(drawn.axes, drawn.strips), unit)
     return figure
 
@@ -116,7 +111,7 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
 def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     """Draw the bands of a curve, the material alone and the measurements; of several paths lines for the latter two."""
     curve, percent, is_one = described.curve, f"{100 * described.prob:.4g} %", len(described.ways) == 1
-    has_parts = described.has_discrepancy and is_determined(described.stress_alone, described.stress)
+    has_parts = has_discrepancy(described.solution) and is_determined(described.stress_alone, described.stress)
     material_stress = described.stress_alone if has_parts else None
     measured, error = curve.stress / unit.to_mpa, curve.standard_error / unit.to_mpa
     core = [measured - error, measured + error, described.stress.median / unit.to_mpa]

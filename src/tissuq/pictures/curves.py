@@ -87,11 +87,6 @@ class Described:
         """Of the stress of the material alone."""
         return self._alone[1]
 
-    @property
-    def has_discrepancy(self) -> bool:
-        """Whether there is a discrepancy, without which the material alone is all."""
-        return bool(self.solution.model.discrepancy.parameters)
-
     @cached_property
     def ways(self) -> list[Way]:
         """The paths that the points of the bands follow."""
@@ -119,7 +114,7 @@ class Described:
 
     @cached_property
     def _alone(self) -> list[Band]:
-        return self._bands(False) if self.has_discrepancy else self._joint
+        return self._bands(False) if has_discrepancy(self.solution) else self._joint
 
     def _bands(self, discrepancy: bool) -> list[Band]:
         options: dict[str, Any] = {"prob": self.prob, "mode": self.curve.mode, "channel": self.curve.channel}
@@ -133,6 +128,11 @@ def described(
     curves = solution.model.experiment.curves
     pairs = zip(curves, inside or [None] * len(curves), strict=True)
     return [Described(solution, curve, prob, is_inside) for curve, is_inside in pairs]
+
+
+def has_discrepancy(solution: Solution) -> bool:
+    """Return whether there is a discrepancy, without which the material alone is all."""
+    return bool(solution.model.discrepancy.parameters)
 
 
 def is_determined(material: Band, stress: Band) -> bool:

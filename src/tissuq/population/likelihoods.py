@@ -238,7 +238,7 @@ def _smoothed(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMix
         np.repeat(mixture.weights / draws_per_component, draws_per_component)[is_inside],
         coordinates.to_line(draws[is_inside]),
     )
-    centre, covariance = GaussianMixture.of_points(weights, np.zeros((len(line), 0)), line).moments()
+    centre, covariance = GaussianMixture.of_points(np.zeros((len(line), 0)), line).weighted(weights).moments()
     effective = weights.sum() ** 2 / (weights**2).sum()
     width = KERNEL_WIDTH_RATIO * (4 / (size + 2) / effective) ** (1 / (size + 4))
     points = centre + np.sqrt(1 - width**2) * (line - centre)

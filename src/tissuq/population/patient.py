@@ -72,8 +72,7 @@ def patient_posterior(population: PopulationDraws) -> Posterior:
         np.array([columns[symbol] for symbol in symbols]).reshape(-1, chains * draws).T
         for symbols in (model.nonlinear, model.linear)
     )
-    weights = np.full(chains * draws, 1 / (chains * draws))
-    mixture = GaussianMixture.of_points(weights, settings, linear)
+    mixture = GaussianMixture.of_points(settings, linear)
     support = {parameter.symbol: parameter.support for parameter in model.parameters}
     names = f"{count} specimens, pooled in {', '.join(coordinates.symbols)}"
     covariates = population.covariates.described(population.patient_covariates)
@@ -85,7 +84,7 @@ def patient_posterior(population: PopulationDraws) -> Posterior:
         "population",
         f"a new specimen of the population of {names}; what is not pooled is that of a random specimen{left_out}",
         lambda: mixture,
-        Marginals.of(model, lambda symbol: marginal_of_points(columns[symbol], weights, support[symbol])),
+        Marginals.of(model, lambda symbol: marginal_of_points(columns[symbol], mixture.weights, support[symbol])),
         sampled=linear.reshape(chains, draws, -1),
         diagnostics=_diagnostics(hierarchy, values.reshape(chains, draws, -1), model.symbols),
         is_of_data=False,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -65,12 +66,14 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
         arrays["slopes"] = (("measurement", "control"), model.fitted_errors.slopes, {"units": "MPa"})
     groups = {MODEL: LabelledGroup(arrays, attrs={"settings": json.dumps(plain)})}
     for number, test in enumerate(experiment.tests):
+        arrays = {
+            "stretch": (("point", "control")[: test.stretch.ndim], test.stretch, {"units": "1"}),
+            "stress": (("point", "stress_of_mode")[: test.stress.ndim], test.stress, {"units": "MPa"}),
+        }
+        if test.standard_error.any():
+            arrays["standard_error"] = ("measurement", test.standard_error, {"units": "MPa"})
         groups[f"{TESTS}/{number}"] = LabelledGroup(
-            {
-                "stretch": (("point", "control")[: test.stretch.ndim], test.stretch, {"units": "1"}),
-                "stress": (("point", "stress_of_mode")[: test.stress.ndim], test.stress, {"units": "MPa"}),
-            }
-            | _standard_error_of(test),
+            arrays,
             attrs={
                 "mode": test.mode.name,
                 "least_errors": json.dumps(test.least_errors),
@@ -157,13 +160,6 @@ def _check_unchanged(model: StatisticalModel, recorded: FloatArray | None) -> No
     )
 
 
-def _standard_error_of(test: Experiment) -> dict[str, Any]:
-    """Return the standard errors of a test as an array, where it has some."""
-    if not test.standard_error.any():
-        return {}
-    return {"standard_error": ("measurement", test.standard_error, {"units": "MPa"})}
-
-
 def _test(group: Group) -> Experiment:
     labels = {label: str(group.attrs.get(label, "")) for label in LABELS}
     rows = {name: int(group.attrs.get(name, 1)) for name in ("averaged", "apart")}
@@ -202,10 +198,8 @@ def _named(kind: str, name: str, find: Callable[[str], T] | None, supplied: T | 
     """Return the material or discrepancy of a name; the one given, where there is none of that name."""
     registered = None
     if find is not None:
-        try:
+        with suppress(TissuqError):  # of the user's own, and not defined here
             registered = find(name)
-        except TissuqError:  # of the user's own, and not defined here
-            registered = None
     if registered is None and supplied is None:
         raise InputError(
             f"the {kind} '{name}' of this posterior is your own, and its file is run only where you name it yourself: "

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from tissuq.inference.solution import Solution
 from tissuq.model.prior_draws import draw_from_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.checks import check_probability
+from tissuq.parameters.parameter import Parameter
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import LeaveOneOut, pointwise_log_likelihood, replicate_data, stride
 
@@ -34,8 +36,6 @@ def labelled_arrays(
     chains, draws = (np.arange(size) for size in solution.shape)
     sample = {"chain": chains, "draw": draws}
     thinned_sample = {"chain": chains, "draw": draws[:: stride(solution)]}
-    parameters = {parameter.symbol: parameter for parameter in solution.model.reported_parameters}
-    scales = {symbol: unit.to_mpa if parameter.unit else 1.0 for symbol, parameter in parameters.items()}
     in_stress, of_mpa = {"units": unit.name}, {"density_of": "stresses in MPa"}
     coordinates = {"stretch": ("measurement", experiment.states.abscissa, {"units": "1"})}
     if len(experiment.tests) > 1:
@@ -45,17 +45,7 @@ def labelled_arrays(
             {},
         )
     groups = {
-        "posterior": LabelledGroup(
-            {
-                symbol: (
-                    ("chain", "draw"),
-                    values / scales[symbol],
-                    {"units": unit.name if parameters[symbol].unit else "1"},
-                )
-                for symbol, values in _draws(solution, seed).items()
-            },
-            sample,
-        ),
+        "posterior": LabelledGroup(_labelled(_draws(solution, seed), solution.model.reported_parameters, unit), sample),
         "observed_data": LabelledGroup(
             {"stress": ("measurement", experiment.measured / unit.to_mpa, in_stress)}, point
         ),
@@ -90,16 +80,11 @@ def prior_arrays(model: StatisticalModel, draws: int, seed: int, unit: StressUni
     generator = np.random.default_rng([seed, 4])
     drawn, stresses = zip(*(draw_from_prior(model, generator) for _ in range(draws)), strict=True)
     sample = {"chain": np.arange(1), "draw": np.arange(draws)}
-    of_parameters = {}
-    for parameter in model.parameters:
-        values = np.array([[one[parameter.symbol] for one in drawn]])
-        units = unit.name if parameter.unit else "1"
-        scaled = values / (unit.to_mpa if parameter.unit else 1.0)
-        of_parameters[parameter.symbol] = (("chain", "draw"), scaled, {"units": units})
+    values = {symbol: np.array([[one[symbol] for one in drawn]]) for symbol in model.symbols}
     dimensions, point = ("chain", "draw", "measurement"), {"measurement": np.arange(model.experiment.size)}
     stress = np.array([stresses]) / unit.to_mpa
     return {
-        "prior": LabelledGroup(of_parameters, sample),
+        "prior": LabelledGroup(_labelled(values, model.parameters, unit), sample),
         "prior_predictive": LabelledGroup({"stress": (dimensions, stress, {"units": unit.name})}, sample | point),
     }
 
@@ -176,6 +161,15 @@ def _numbers(solution: Solution, symbol: str, prob: float) -> dict[str, float]:
         return numbers
     ess = min(diagnostics.ess_bulk[symbol], diagnostics.ess_tail[symbol])
     return numbers | {"ess": ess, "rhat": diagnostics.rhat[symbol]}
+
+
+def _labelled(draws: Mapping[str, FloatArray], parameters: Sequence[Parameter], unit: StressUnit) -> dict[str, Any]:
+    """Return draws (chains, draws) of parameters with their dimensions and units, those that are stresses in a unit."""
+    arrays, is_stress = {}, {parameter.symbol: bool(parameter.unit) for parameter in parameters}
+    for symbol, values in draws.items():
+        scale, units = (unit.to_mpa, unit.name) if is_stress[symbol] else (1.0, "1")
+        arrays[symbol] = (("chain", "draw"), values / scale, {"units": units})
+    return arrays
 
 
 def _draws(solution: Solution, seed: int) -> dict[str, FloatArray]:

@@ -14,8 +14,8 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.solution import Solution
-from tissuq.pictures.answer import answer, discrepancy_shares, has_shares
-from tissuq.pictures.curves import described
+from tissuq.pictures.answer import answer, discrepancy_shares
+from tissuq.pictures.curves import described, has_discrepancy
 from tissuq.pictures.parameters import MODULUS, marginal_of, marginals, parameters_to_show, ridges
 from tissuq.pictures.prediction import prediction, predictions
 from tissuq.pictures.stability import stability
@@ -69,7 +69,7 @@ class PosteriorPlots:
         >>> plt.close(axis.figure)
         """
         count = len(self.solution.model.experiment.curves)
-        with panels(ax, count, has_strips=has_shares(self.solution)) as drawn:
+        with panels(ax, count, has_strips=has_discrepancy(self.solution)) as drawn:
             answer(described(self.solution, prob), drawn, self.unit(unit))
         return drawn.result
 
@@ -129,7 +129,7 @@ class PosteriorPlots:
         The rest is the material's. Scatter from point to point is no part of either. Where there is next to no
         stress, there is no share.
         """
-        if not has_shares(self.solution):
+        if not has_discrepancy(self.solution):
             raise InputError("this posterior has no discrepancy to draw: fit with one, such as discrepancy='auto'.")
         with panels(ax, len(self.solution.model.experiment.curves)) as drawn:
             discrepancy_shares(self.solution, drawn, prob)

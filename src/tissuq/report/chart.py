@@ -17,7 +17,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
-from tissuq.pictures.curves import Described, held_along, is_determined, rows_where_held
+from tissuq.pictures.curves import Described, has_discrepancy, held_along, is_determined, rows_where_held
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands
 from tissuq.report.figures import described_curves
@@ -134,7 +134,9 @@ def _measured(described: Sequence[Described]) -> Iterator[tuple[_Test, _Bands | 
             abscissa, stress, is_back = curve.drawn_at()[rows], curve.stress[rows], curve.is_back[rows]
             test = _Test(f"{name}{way}", curve.mode, curve.channel, points, abscissa, stress, curve.drawn_against,
                          is_curve, is_back)  # fmt: skip
-            material_stress = _at(described_curve.stress_alone, shown) if described_curve.has_discrepancy else None
+            material_stress = (
+                _at(described_curve.stress_alone, shown) if has_discrepancy(described_curve.solution) else None
+            )
             yield (
                 test,
                 _Bands(_at(described_curve.measurements, shown), _at(described_curve.stress, shown), material_stress),

@@ -20,10 +20,9 @@ from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.proposal_mixture import Mixture, fitted, weighted_points
 from tissuq.inference.quasi_monte_carlo import Proposal, effective, even_points, log_normal
 from tissuq.inference.solution import Marginals, Solution
-from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat
 
 POINTS_PER_PARAMETER = 256
 """Points of a round for each parameter, about: their number is a power of two."""
@@ -111,10 +110,9 @@ class AdaptedPoints:
         weights /= weights.sum()
         matters = weights > NEGLIGIBLE_WEIGHT
         weights, settings = weights[matters] / weights[matters].sum(), density.settings(points[matters])
-        box, gaussians = density.conditional.boxes, density.conditional(settings[None])
+        gaussians = density.conditional(settings[None])
         mixture = GaussianMixture(weights, settings, gaussians.mean[0], gaussians.root[0])
-        mass_outside = box.beyond(mixture.mean, mixture.root)
-        truncated = TruncatedMixture.of(mixture, mass_outside, box)
+        truncated = TruncatedMixture(mixture, density.conditional.boxes)
 
         def marginal(symbol: str) -> Marginal:
             if symbol in model.linear:
@@ -132,9 +130,9 @@ class AdaptedPoints:
             truncated.components,
             seed,
         )
-        if any(isinstance(prior, Flat) for prior in model.priors.values()):
+        if model.is_improper:
             return solution
-        _, error_of_mass = checked_masses(model.linear, mixture, mass_outside, box)
+        _, error_of_mass = truncated.checked_masses(model.linear)
         error = float(np.sqrt(1 / number - 1 / len(log_weights))) + error_of_mass
         return replace(solution, log_evidence=log_mass, log_evidence_error=error)
 

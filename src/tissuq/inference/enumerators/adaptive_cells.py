@@ -33,9 +33,9 @@ from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
 from tissuq.inference.reduction import BasesOf, bases_of
 from tissuq.inference.solution import Marginals, Solution
-from tissuq.inference.truncated_mixture import TruncatedMixture, checked_masses
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat, Prior
+from tissuq.parameters.priors import Prior
 
 DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
@@ -236,8 +236,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     box = integration.conditional.boxes[[index]]
     weights = rule.weights[index] if rule else np.ones(1)
     mixture = GaussianMixture(weights, integration.settings[index], gaussians.mean[index], gaussians.root[index])
-    mass_outside = box.beyond(mixture.mean, mixture.root)
-    truncated = TruncatedMixture.of(mixture, mass_outside, box)
+    truncated = TruncatedMixture(mixture, box)
 
     def marginal(symbol: str) -> Marginal:
         if symbol in model.linear:
@@ -253,9 +252,9 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     solution = Solution(
         model, "exact", f"{linear}; {integrated}{cut}", truncated.components, Marginals.of(model, marginal), seed=seed
     )
-    if any(isinstance(prior, Flat) for prior in model.priors.values()):
+    if model.is_improper:
         return solution
-    log_mass, error_of_mass = checked_masses(model.linear, mixture, mass_outside, box)
+    log_mass, error_of_mass = truncated.checked_masses(model.linear)
     if rule:
         evidence = float(rule.log_integral[index])
         error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT_LOG_DROP) + error_of_mass)

@@ -36,7 +36,7 @@ from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat, Prior
+from tissuq.parameters.priors import Prior
 
 MAX_PRIOR_MASS_ERROR = 0.01
 """Error of the mass of an amplitude's prior, summed on every second point, up to which the lattice serves it."""
@@ -187,11 +187,10 @@ class _EnergySums:
         self._shares = np.bincount(self._node, self._weights, minlength=len(nodes))
         settings = self._settings(points, self._node)
         gaussians = GaussianMixture(self._weights, settings, mean, root).resampled(MAX_MARGINAL_POINTS)
-        outside_of_few = self._box.beyond(gaussians.mean, gaussians.root)
-        self._truncated = TruncatedMixture.of(gaussians, outside_of_few, self._box)
+        self._truncated = TruncatedMixture(gaussians, self._box)
         self._mass_outside = mass_outside.sum(axis=1)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
-        if not any(isinstance(prior, Flat) for prior in model.priors.values()):
+        if not model.is_improper:
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
             # Nodes far from the posterior may end within large amplitudes: what is unknown there does not matter.
             matters = self._shares > NEGLIGIBLE_SHARE
@@ -270,7 +269,7 @@ class _EnergySums:
         mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
-        return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components(few)
+        return TruncatedMixture(mixture, box).components(few)
 
     def _marginal(self, components: int, symbol: str) -> Marginal:
         if symbol in self.model.linear:

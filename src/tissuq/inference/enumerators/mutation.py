@@ -106,14 +106,8 @@ class Program(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def compiled_program(
-    log_likelihood: Callable[..., Any],
-    log_prior: Callable[..., Any],
-    lower: tuple[float, ...],
-    upper: tuple[float, ...],
-) -> Program:
+def compiled_program(log_likelihood: Callable[..., Any], log_prior: Callable[..., Any], box: Box) -> Program:
     """Return the functions of all particles at once; whatever changes with temperature or data is an argument."""
-    box = Box(lower, upper)
     trajectory = blackjax.hmc.build_kernel()
     jump = blackjax.additive_step_random_walk.build_kernel()
 

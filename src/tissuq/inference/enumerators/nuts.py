@@ -185,7 +185,7 @@ def sample_nuts(
     derivatives = derivatives_on_line(log_density, box, *arguments)
     modes = find_modes(derivatives, box, start, generator)
     states = _overdispersed(derivatives, modes, settings.chains, generator)
-    run = _compiled_run(log_density, *_bounds(box), replace(settings, seed=0))
+    run = _compiled_run(log_density, box, replace(settings, seed=0))
     key = jax.random.key(settings.seed)
     trace = run(key, states, _schedule(settings), modes[0].location, modes[0].scale, *arguments)
     values, energies, divergent, leapfrogs = (np.asarray(array) for array in trace)
@@ -225,15 +225,13 @@ class _Tuning(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _compiled_run(
-    log_density: Callable[..., Any], lower: tuple[float, ...], upper: tuple[float, ...], settings: NutsSettings
-) -> Any:
+def _compiled_run(log_density: Callable[..., Any], box: Box, settings: NutsSettings) -> Any:
     """Return the function that runs all chains in one compiled loop.
 
     It returns values by chain and draw; energies, divergences and leapfrogs by chain and trajectory. Warm-up and
     sampling share the loop body: the trajectory code, by far the costliest to compile, appears once.
     """
-    box, kernel = Box(lower, upper), blackjax.nuts.build_kernel()
+    kernel = blackjax.nuts.build_kernel()
 
     @jax.jit
     def run(key: Any, states: Any, schedule: Any, location: Any, scale: Any, *data: Any) -> Any:
@@ -269,10 +267,6 @@ def _compiled_run(
         return to_box(positions[:, thinned]), *statistics
 
     return run
-
-
-def _bounds(box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(box.lower.tolist()), tuple(box.upper.tolist())
 
 
 def _schedule(settings: NutsSettings) -> tuple[BoolArray, ...]:

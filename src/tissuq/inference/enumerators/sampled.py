@@ -21,7 +21,6 @@ from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.quasi_monte_carlo import resampled_at_random
 from tissuq.inference.solution import Diagnostics, Marginals, Solution
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.priors import Flat
 
 MAX_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""
@@ -134,7 +133,7 @@ def sample_by_nuts(model: StatisticalModel, seed: int = 0, refusal: str = "") ->
     else:
         reason = f"{because}NUTS on {', '.join(model.nonlinear)}; {conditional.account}"
         solution = _solution(model, "nuts", reason, *conditional.mixture_and_draws(seed), sampled)
-    if refusal and not _is_improper(model):
+    if refusal and not model.is_improper:
         by_smc = sample_by_smc(model, seed)
         solution = replace(
             solution,
@@ -160,7 +159,7 @@ def sample_by_smc(model: StatisticalModel, seed: int = 0) -> Solution:
     conditional = _ConditionalDraws(model, density, data, sampled.values)
     reason = f"tempered SMC on {', '.join(model.nonlinear)}; {conditional.account}"
     solution = _solution(model, "smc", reason, *conditional.mixture_and_draws(seed), sampled)
-    if _is_improper(model):
+    if model.is_improper:
         return solution
     evidence = sampled.log_evidence + conditional.log_mean_inside
     error = float(np.hypot(sampled.log_evidence_error, conditional.log_mean_inside_error))
@@ -215,8 +214,7 @@ class _ConditionalDraws:
 def _points(settings: FloatArray, linear: FloatArray) -> GaussianMixture:
     """Return draws (chains, draws, d) and (chains, draws, p) as points of the same weight."""
     count = settings.shape[0] * settings.shape[1]
-    weights = np.full(count, 1 / count)
-    return GaussianMixture.of_points(weights, settings.reshape(count, -1), linear.reshape(count, -1))
+    return GaussianMixture.of_points(settings.reshape(count, -1), linear.reshape(count, -1))
 
 
 def _solution(
@@ -247,10 +245,6 @@ def _diagnostics(draws: Mapping[str, FloatArray], sampled: NutsDraws | SmcDraws)
 
 def _acceptance(model: StatisticalModel) -> float:
     return 0.95 if model.is_correlated else 0.9
-
-
-def _is_improper(model: StatisticalModel) -> bool:
-    return any(isinstance(prior, Flat) for prior in model.priors.values())
 
 
 def _check_size(model: StatisticalModel) -> None:

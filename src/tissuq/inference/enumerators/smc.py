@@ -237,7 +237,7 @@ def sample_smc(
     box = Box(lower, upper)
     labels = box.labels(names)
     arguments = () if data is None else (data,)
-    program = compiled_program(log_likelihood, log_prior, tuple(box.lower.tolist()), tuple(box.upper.tolist()))
+    program = compiled_program(log_likelihood, log_prior, box)
     lines = _starting_lines(box, prior_draws, settings)
     log_likelihoods = _log_likelihoods_at_start(program, lines, arguments)
     # Not the plain seed: the caller may have drawn the prior's particles from it.
