@@ -122,7 +122,7 @@ def marginal_of_points(
     peaks the standard deviation is that of neither. Points are mirrored at a bound near them, and where they end at
     once, as a ridge does at the bound of another parameter; elsewhere they are drawn towards the mean by what the
     kernel adds to the variance. Above a bound that is positive, as those of what may differ by powers of ten are, the
-    logarithms are smoothed.
+    logarithms are smoothed; above zero where a tail is so long that the table would have few values in the middle.
     """
     weights = weights / weights.sum()
     if bounds[0] > 0 and bandwidth is None:
@@ -137,6 +137,10 @@ def marginal_of_points(
         rising = np.cumsum(weights[order])
         of_weight = order[(rising > NEGLIGIBLE) & (rising - weights[order] < rising[-1] - NEGLIGIBLE)]
         points, weights = points[of_weight], weights[of_weight]
+        if given is None and np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth and bounds[0] == 0 < points.min():
+            return replace(
+                marginal_of_points(points, weights, (float(np.finfo(float).tiny), bounds[1])), mean=mean, sd=sd
+            )
     if given is None:
         bounds = -_last(-points, weights, bandwidth, -bounds[0]), _last(points, weights, bandwidth, bounds[1])
         points = np.clip(points, *bounds)
