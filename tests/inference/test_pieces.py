@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
-from scipy.stats import expon, multivariate_normal, norm, truncnorm
+from scipy.stats import beta, expon, lognorm, multivariate_normal, norm, truncnorm, uniform
 
 import tissuq as tq
 from tissuq.experiments.modes import Uniaxial
@@ -208,6 +208,27 @@ def test_points_over_powers_of_ten_keep_their_quantiles():
     for probability in (0.05, 0.25, 0.5, 0.75, 0.95):
         assert marginal.quantile(probability) == pytest.approx(0.01 * 1e5**probability, rel=0.05)
     assert marginal.mean == pytest.approx(999.99 / np.log(1e5), rel=0.01)
+
+
+@pytest.mark.parametrize("distribution", [uniform(), beta(3, 1), truncnorm(-1, np.inf), norm(), beta(2, 2)])
+def test_points_keep_their_quantiles_where_their_density_is_cut_and_where_it_tails_off(distribution):
+    """Smoothed over the end of a ridge, the 97.5 % point of an angle lay where there was no posterior."""
+    points, probabilities = distribution.ppf((np.arange(400) + 0.5) / 400), np.array([0.025, 0.5, 0.975])
+    marginal = marginal_of_points(points, np.ones(400), (-np.inf, np.inf))
+    assert distribution.cdf(marginal.quantile(probabilities)) == pytest.approx(probabilities, abs=0.01)
+    low, high = marginal.hdi()
+    assert distribution.cdf(high) - distribution.cdf(low) == pytest.approx(0.95, abs=0.01)
+
+
+def test_positive_points_with_a_long_tail_keep_their_quantiles():
+    """The whole middle lay in one of 1000 even bins: for a median of 0.10 of Knowles' b the table said 0.72."""
+    distribution = lognorm(2.5, scale=0.1)
+    points = distribution.ppf((np.arange(4000) + 0.5) / 4000)
+    probabilities = np.array([0.025, 0.25, 0.5, 0.75, 0.975])
+    marginal = marginal_of_points(points, np.ones(4000), (0.0, np.inf))
+    assert distribution.cdf(marginal.quantile(probabilities)) == pytest.approx(probabilities, abs=0.01)
+    low, high = marginal.hdi()
+    assert distribution.cdf(high) - distribution.cdf(low) == pytest.approx(0.95, abs=0.01)
 
 
 def test_points_of_which_one_holds_most_have_a_marginal():

@@ -24,6 +24,8 @@ QUANTILES_OF_WIDENED = 800
 """Of equal probability, into which a marginal is divided."""
 NEGLIGIBLE = 1e-9
 """Probability at either end that is left out of the table of weighted points that lie far apart."""
+MANY_AT_END = 10
+"""Effective points that a bandwidth holds at the last density of points, if it is cut there; of tails about one."""
 LOG_BINS = 10_000
 """In which the logarithms of many values are sorted."""
 
@@ -117,9 +119,10 @@ def marginal_of_points(
     """Return the marginal of weighted points within bounds, by a kernel estimate that keeps their variance.
 
     Silverman's bandwidth, unless another is given, for the shortest interval that holds half of them, as between two
-    peaks the standard deviation is that of neither; points near a bound are mirrored there, and elsewhere drawn towards
-    the mean by what the kernel adds to the variance. Above a bound that is positive, as those of what may differ by
-    powers of ten are, the logarithms are smoothed.
+    peaks the standard deviation is that of neither. Points are mirrored at a bound near them, and where they end at
+    once, as a ridge does at the bound of another parameter; elsewhere they are drawn towards the mean by what the
+    kernel adds to the variance. Above a bound that is positive, as those of what may differ by powers of ten are, the
+    logarithms are smoothed; above zero where a tail is so long that the table would have few values in the middle.
     """
     weights = weights / weights.sum()
     if bounds[0] > 0 and bandwidth is None:
@@ -128,12 +131,19 @@ def marginal_of_points(
         return Marginal.of(*moments_of_values(weights, points), values, logs.density / values, logs.cumulative)
     mean, sd = moments_of_values(weights, points)
     spread = min(sd, _shortest_half(points, weights) / 1.349 or sd)
-    bandwidth = bandwidth or 0.9 * spread * float(weights @ weights) ** 0.2
+    given, bandwidth = bandwidth, bandwidth or 0.9 * spread * float(weights @ weights) ** 0.2
     if np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth:  # points far off would leave a narrow posterior few bins
         order = np.argsort(points)
         rising = np.cumsum(weights[order])
         of_weight = order[(rising > NEGLIGIBLE) & (rising - weights[order] < rising[-1] - NEGLIGIBLE)]
         points, weights = points[of_weight], weights[of_weight]
+        if given is None and np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth and bounds[0] == 0 < points.min():
+            return replace(
+                marginal_of_points(points, weights, (float(np.finfo(float).tiny), bounds[1])), mean=mean, sd=sd
+            )
+    if given is None:
+        bounds = -_last(-points, weights, bandwidth, -bounds[0]), _last(points, weights, bandwidth, bounds[1])
+        points = np.clip(points, *bounds)
     low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
     is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
     if not is_cut and sd > bandwidth:
@@ -145,6 +155,19 @@ def marginal_of_points(
     smooth = np.convolve(np.pad(heights, reach, mode="symmetric"), kernel / kernel.sum(), mode="valid")
     cumulative = np.concatenate([[0.0], np.cumsum(smooth)])
     return Marginal.of(mean, sd, edges, np.interp(edges, edges[:-1] + 0.5 * step, smooth), cumulative)
+
+
+def _last(points: FloatArray, weights: FloatArray, bandwidth: float, bound: float) -> float:
+    """Return where the density of weighted points ends at once: a bound, unless they end before it and do not tail off.
+
+    The density is extended from the last two bandwidths, as a line; beyond the end lies half of an effective point.
+    """
+    order = np.argsort(points)
+    one = float(weights @ weights)
+    last = float(points[order][np.searchsorted(np.cumsum(weights[order]), 1 - 0.5 * one)])
+    outer, both = (float(weights[points > last - reach].sum()) for reach in (bandwidth, 2 * bandwidth))
+    is_cut = 1.5 * outer - 0.5 * (both - outer) > MANY_AT_END * one
+    return last if is_cut and last + bandwidth < bound else bound
 
 
 def _shortest_half(points: FloatArray, weights: FloatArray) -> float:

@@ -84,7 +84,8 @@ def fit(
         between specimens and tests are as large as several tests tell. Standard errors of means that the data state are
         in all of them but ``"as-tested"``.
     method : str
-        ``"exact"``: closed form and quadrature over at most three nonlinear parameters, importance points of more.
+        ``"exact"``: closed form and quadrature over at most three nonlinear parameters, importance points of more and
+        of ridges too thin for it.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
         ``"smc"``: the same with tempered sequential Monte Carlo, which gives the evidence, too.
         ``"joint"``: the no-U-turn sampler over all parameters, nothing integrated, as in the paper.
