@@ -131,17 +131,17 @@ def marginal_of_points(
         return Marginal.of(*moments_of_values(weights, points), values, logs.density / values, logs.cumulative)
     mean, sd = moments_of_values(weights, points)
     spread = min(sd, _shortest_half(points, weights) / 1.349 or sd)
-    given, bandwidth = bandwidth, bandwidth or 0.9 * spread * float(weights @ weights) ** 0.2
+    is_silverman, bandwidth = bandwidth is None, bandwidth or 0.9 * spread * float(weights @ weights) ** 0.2
     if np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth:  # points far off would leave a narrow posterior few bins
         order = np.argsort(points)
         rising = np.cumsum(weights[order])
         of_weight = order[(rising > NEGLIGIBLE) & (rising - weights[order] < rising[-1] - NEGLIGIBLE)]
         points, weights = points[of_weight], weights[of_weight]
-        if given is None and np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth and bounds[0] == 0 < points.min():
+        if is_silverman and np.ptp(points) > 0.5 * TABLE_POINTS * bandwidth and bounds[0] == 0 < points.min():
             return replace(
                 marginal_of_points(points, weights, (float(np.finfo(float).tiny), bounds[1])), mean=mean, sd=sd
             )
-    if given is None:
+    if is_silverman:
         bounds = -_last(-points, weights, bandwidth, -bounds[0]), _last(points, weights, bandwidth, bounds[1])
         points = np.clip(points, *bounds)
     low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
