@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import tissuq as tq
 from tissuq.inference.enumerators.quadrature import has_missed
 
 BOUNDS = np.array([[-np.inf, np.inf], [-4.0, 4.0]])
@@ -54,3 +55,33 @@ def test_what_lies_beyond_the_bounds_does_not_count(slope):
 
     points, weights = sample(towards_the_bound, np.zeros(2), np.array([6.0, 4.0]), 40_000)
     assert not has_missed(towards_the_bound, BOUNDS, points, weights, STARTS)
+
+
+def test_a_thin_ridge_is_followed_through_cells_whose_points_it_misses():
+    """Of knowles' law and precise data, mu integrated, against a grid that is fine along the ridge.
+
+    In one cell the ridge had gone between the points: there the density of n was a third of what it is beside.
+    """
+    stretch, sd = np.linspace(0.8, 1.5, 7), 1e-4
+    unit, x = stretch - stretch**-2, stretch**2 + 2 / stretch - 3
+    stress = 0.1 * unit * (1 + x / 2) + sd * np.random.default_rng(3).standard_normal(7)
+    options = {"material": "knowles", "discrepancy": "none", "noise_sd": sd, "tolerances": "as-tested"}
+    solution = tq.fit(tq.Experiment("uniaxial", stretch, stress), **options).solution
+
+    def log_density(power, log_b):
+        column = unit * (1 + np.exp(log_b)[..., None] * x / power[..., None]) ** (power[..., None] - 1)
+        inner, with_data = (column**2).sum(axis=-1), column @ stress
+        return -0.5 * (stress @ stress - with_data**2 / inner) / sd**2 - 0.5 * np.log(inner)
+
+    powers, coarse = np.linspace(1.3, 6, 600)[:, None], np.linspace(-6, 6, 3000)
+    best = coarse[log_density(*np.broadcast_arrays(powers, coarse)).argmax(axis=1)]
+    fine = best[:, None] + np.linspace(-0.3, 0.3, 2001)
+    priors = solution.model.priors
+    heights = log_density(*np.broadcast_arrays(powers, fine)) - 6 * np.log(sd * np.sqrt(2 * np.pi)) + fine
+    heights += priors["b"].log_density(np.exp(fine)) + priors["n"].log_density(powers) - np.log(priors["mu"].high)
+    cell = (powers[1, 0] - powers[0, 0]) * (fine[0, 1] - fine[0, 0])
+    weights = np.exp(heights - heights.max())
+    assert solution.log_evidence == pytest.approx(heights.max() + np.log(weights.sum() * cell), abs=0.003)
+    density = weights.sum(axis=1) / weights.sum() / (powers[1, 0] - powers[0, 0])
+    at = np.linspace(1.6, 2.2, 31)
+    assert solution.marginals["n"].pdf(at) == pytest.approx(np.interp(at, powers[:, 0], density), abs=0.1)

@@ -22,6 +22,9 @@ ORDERS = {1: 10, 2: 10, 3: 7}
 FIRST_CELLS_PER_SIDE = 2
 """Cells along each side to begin with."""
 MAX_CELLS = 20_000
+MIN_RIDGE_SHARE, MAX_RIDGE_DROP, MAX_WIDTH_RATIO = 1e-5, 4.0, 2.0
+"""Share of a cell from which a ridge in it may go on in the next one; log density below the largest where they meet,
+above which it does, unless the next one's is lower by as much; and how many times wider that is, at the least."""
 
 
 START_PROBABILITIES = np.array([0.15, 0.5, 0.85])
@@ -173,16 +176,18 @@ def integrate(
         integrals, errors = _resolve(cells, top)
         total = integrals.sum(axis=1, keepdims=True)
         error = errors.max(axis=2) / total
-        if (error.sum(axis=1) <= tolerance).all():
-            return _finish(cells, top, integrals, error)
+        if (error.sum(axis=1) > tolerance).any():
+            halved, sides = _unresolved(error, errors)
+        else:
+            halved, sides = _beside_ridges(cells, top, integrals / total)
+            if not len(halved):
+                return _finish(cells, top, integrals, error)
         if cells.log_values.shape[1] > MAX_CELLS:
             raise ConvergenceError(
                 f"quadrature over {dimension} nonlinear parameters did not reach its tolerance "
                 f"(relative error {error.sum(axis=1).max():.1g}); use the method 'nuts' or narrower priors."
             )
-        worst = error.argmax(axis=0)
-        cell = np.arange(len(worst))
-        cells = _halved(log_function, cells, error[worst, cell], errors[worst, cell].argmax(axis=1))
+        cells = _halved(log_function, cells, halved, sides)
 
 
 def _first_cells(log_function: LogFunction, dimension: int) -> Cells:
@@ -220,16 +225,52 @@ def _resolve(cells: Cells, top: FloatArray) -> tuple[FloatArray, FloatArray]:
     return integrals, errors
 
 
-def _halved(log_function: LogFunction, cells: Cells, error: FloatArray, side: IndexArray) -> Cells:
-    """Halve the worst cells that together hold nine tenths of the error."""
-    order = np.argsort(error)[::-1]
-    count = int(np.searchsorted(np.cumsum(error[order]), 0.9 * error.sum())) + 1
-    is_halved = np.zeros(len(error), dtype=bool)
-    is_halved[order[:count]] = True
-    halved = (np.arange(cells.lower.shape[1]) == side[is_halved][:, None]) * 0.5
-    width = cells.width[is_halved] * (1 - halved)
-    upper_half = cells.lower[is_halved] + cells.width[is_halved] * halved
-    lower = np.concatenate([cells.lower[is_halved], upper_half])
+def _unresolved(error: FloatArray, errors: FloatArray) -> tuple[IndexArray, IndexArray]:
+    """Return the worst cells that together hold nine tenths of the error, and the side of each along which it is."""
+    worst, cell = error.argmax(axis=0), np.arange(error.shape[1])
+    largest = error[worst, cell]
+    order = np.argsort(largest)[::-1]
+    count = int(np.searchsorted(np.cumsum(largest[order]), 0.9 * largest.sum())) + 1
+    rows = np.sort(order[:count])
+    return rows, errors[worst, cell].argmax(axis=1)[rows]
+
+
+def _beside_ridges(cells: Cells, top: FloatArray, shares: FloatArray) -> tuple[IndexArray, IndexArray]:
+    """Return cells that a thin ridge may enter between their points, from one beside, and a wider side of each.
+
+    The density of that one is large where it meets them, and theirs is negligible there.
+    """
+    dimension = cells.lower.shape[1]
+    order, upper = ORDERS[dimension], cells.lower + cells.width
+    logs = (cells.log_values - top[:, None, None]).max(axis=0).reshape(-1, *[order] * dimension)
+    nodes, sides_of_cell = gauss_rule(order)[0], dict[int, int]()
+    for row in np.flatnonzero(shares.max(axis=0) > MIN_RIDGE_SHARE):
+        for side, is_upper in product(range(dimension), (True, False)):
+            layer = np.take(logs[row], -1 if is_upper else 0, axis=side)
+            if layer.max() < -MAX_RIDGE_DROP:
+                continue
+            place = np.insert(nodes[list(np.unravel_index(layer.argmax(), layer.shape))], side, float(is_upper))
+            place = cells.lower[row] + place * cells.width[row]
+            is_touching = (cells.lower if is_upper else upper)[:, side] == place[side]
+            others = np.arange(dimension) != side
+            is_beside = ((cells.lower <= place) & (place < upper))[:, others].all(axis=1) & is_touching
+            for beside in np.flatnonzero(is_beside):
+                ratios = np.where(others, cells.width[beside] / cells.width[row], 0.0)
+                drop = layer.max() - np.take(logs[beside], 0 if is_upper else -1, axis=side).max()
+                if drop > MAX_RIDGE_DROP and ratios.max() > MAX_WIDTH_RATIO:
+                    sides_of_cell[int(beside)] = int(ratios.argmax())
+    rows = np.array(sorted(sides_of_cell), dtype=np.intp)
+    return rows, np.array([sides_of_cell[row] for row in rows], dtype=np.intp)
+
+
+def _halved(log_function: LogFunction, cells: Cells, rows: IndexArray, sides: IndexArray) -> Cells:
+    """Halve cells along a side of each."""
+    is_halved = np.zeros(len(cells.lower), dtype=bool)
+    is_halved[rows] = True
+    halved = (np.arange(cells.lower.shape[1]) == sides[:, None]) * 0.5
+    width = cells.width[rows] * (1 - halved)
+    upper_half = cells.lower[rows] + cells.width[rows] * halved
+    lower = np.concatenate([cells.lower[rows], upper_half])
     return cells[~is_halved].joined(_evaluated(log_function, lower, np.concatenate([width, width])))
 
 
