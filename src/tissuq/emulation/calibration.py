@@ -120,7 +120,18 @@ class Calibration:
     @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Warnings that the user must read: sentences, each with a code and a severity."""
-        return tuple(calibration_warnings(self))
+        exact = self.without_emulator_error.posterior
+        sentences = calibration_warnings(
+            self.problem,
+            self.emulator,
+            self.check,
+            self.posterior,
+            exact,
+            self.emulator_share,
+            dict(zip(self.problem.forward_symbols, self.sensitivity["total"].tolist(), strict=True)),
+            self.likelihood,
+        )
+        return tuple(sentences)
 
     @cached_property
     def without_emulator_error(self) -> Calibration:
@@ -262,7 +273,9 @@ class Calibration:
         """
         from tissuq.emulation.material_posterior import material_posterior
 
-        return material_posterior(self, material, stretch, mode=mode, unit=unit)
+        return material_posterior(
+            self.problem, self.posterior, material, stretch, mode=mode, unit=unit, runs=len(self.runs), seed=self.seed
+        )
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""

@@ -26,7 +26,8 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Solver
 
 if TYPE_CHECKING:
-    from tissuq.emulation.calibration import Calibration
+    from tissuq.emulation.problem import Problem
+    from tissuq.emulation.sampling import SampledPosterior
 
 POINTS = 20
 """Number of stretches that stand for the range."""
@@ -37,16 +38,35 @@ CALIBRATION = "calibration"
 
 
 def material_posterior(
-    calibration: Calibration, material: str | Material, stretch: tuple[float, float], *, mode: str, unit: str
+    problem: Problem,
+    sampled: SampledPosterior,
+    material: str | Material,
+    stretch: tuple[float, float],
+    *,
+    mode: str,
+    unit: str,
+    runs: int,
+    seed: int,
 ) -> Posterior:
     """Return the draws of a calibration as the posterior of a material, as `Calibration.posterior_of` says.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was calibrated.
+    sampled : SampledPosterior
+        The draws of its parameters.
+    material, stretch, mode, unit
+        As of `Calibration.posterior_of`.
+    runs : int
+        Of the forward model.
+    seed : int
 
     Raises
     ------
     InputError
         When a parameter of the material was not calibrated, or has a prior beyond its support, or the range is none.
     """
-    problem, sampled = calibration.problem, calibration.posterior
     law, priors = check_material(material, problem.forward_priors, unit)
     loading, factor = loading_mode(mode), stress_unit(unit).to_mpa
     symbols = list(priors)
@@ -71,15 +91,15 @@ def material_posterior(
         model,
         CALIBRATION,
         f"the parameters of a forward model that was calibrated on {len(problem.measured)} measurements "
-        f"through an emulator of {len(calibration.runs)} runs",
+        f"through an emulator of {runs} runs",
         lambda: mixture,
         Marginals.of(model, lambda symbol: marginals[symbol]),
-        seed=calibration.seed,
+        seed=seed,
         sampled=linear.reshape(chains, count, -1),
         diagnostics=Diagnostics(sampled.converged, sampled.verdict, rhat, ess, ess),
         is_of_data=False,
     )
-    return Posterior(solution, Solver(seed=calibration.seed))
+    return Posterior(solution, Solver(seed=seed))
 
 
 def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float, float], mode: str) -> Ensemble:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tissuq.arrays import FloatArray
+from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem, is_far, symbol_of
 from tissuq.emulation.runs import EmulatorCheck
 from tissuq.experiments.smoothing import scatter
@@ -16,7 +17,8 @@ from tissuq.model.noise import NOISE_SD
 from tissuq.result_warning import ResultWarning, Severity
 
 if TYPE_CHECKING:
-    from tissuq.emulation.calibration import Calibration
+    from tissuq.emulation.likelihood import Likelihood
+    from tissuq.emulation.sampling import SampledPosterior
 
 Ends = list[tuple[str, str]]
 """Parameters, and of each the lower or the upper end."""
@@ -75,13 +77,36 @@ DISCREPANCY_WARNINGS = {
 """Warning that belongs to each discrepancy beside a forward model."""
 
 
-def calibration_warnings(calibration: Calibration) -> Iterator[ResultWarning]:
-    """Yield the warnings that a calibration carries, the gravest first."""
-    problem, emulator, posterior = calibration.problem, calibration.emulator, calibration.posterior
+def calibration_warnings(
+    problem: Problem,
+    emulator: Emulator,
+    check: EmulatorCheck,
+    posterior: SampledPosterior,
+    exact: SampledPosterior,
+    emulator_share: Mapping[str, float],
+    totals: Mapping[str, float],
+    likelihood: Likelihood,
+) -> Iterator[ResultWarning]:
+    """Yield the warnings that a calibration carries, the gravest first.
+
+    Parameters
+    ----------
+    problem : Problem
+    emulator : Emulator
+    check : EmulatorCheck
+        Each run of the emulator predicted from the others.
+    posterior, exact : SampledPosterior
+        With the emulator's error, and as if it were exact.
+    emulator_share : mapping of str to float
+        Share of every parameter's posterior variance that is due to the emulator's error.
+    totals : mapping of str to float
+        Total sensitivity index of every parameter of the model.
+    likelihood : Likelihood
+    """
     if not posterior.converged:
         yield ResultWarning(posterior.verdict, "not-converged", Severity.PROBLEM)
-    error_share = _error_share(calibration)
-    without_effect = list(_without_effect(calibration)) if error_share <= MAX_ERROR_SHARE else []
+    error_share = _error_share(problem, emulator, posterior)
+    without_effect = list(_without_effect(problem, posterior, totals)) if error_share <= MAX_ERROR_SHARE else []
     if without_effect:
         yield ResultWarning(
             f"the model hardly depends on {', '.join(without_effect)}, and the result is the prior: see whether the "
@@ -90,10 +115,10 @@ def calibration_warnings(calibration: Calibration) -> Iterator[ResultWarning]:
             symbols=without_effect,
         )
     yield from _far_from_zero_load(problem)
-    none_fit = list(_no_parameters_fit(calibration))
+    none_fit = list(_no_parameters_fit(problem, emulator, posterior, likelihood))
     yield from none_fit
     if emulator.runs.failed.any():
-        share = _share_near_failures(calibration)
+        share = _share_near_failures(emulator, posterior)
         position = (
             f"A share of {100 * share:.0f} % of the posterior is nearer to a failed run than to any other: there the "
             "emulator is unreliable."
@@ -103,9 +128,9 @@ def calibration_warnings(calibration: Calibration) -> Iterator[ResultWarning]:
         severity = Severity.CAUTION if share > MAX_SHARE_NEAR_FAILURES else Severity.NOTE
         yield ResultWarning(f"{emulator.runs.failure_summary} {position}", "inaccurate-emulator", severity)
     if not none_fit:  # of which there is nothing to be made more accurate
-        yield from _large_error(calibration, error_share)
-    yield from _over_confident(calibration.check)
-    at_bounds, beyond_runs = _at_ends(calibration)
+        yield from _large_error(problem, posterior, exact, emulator_share, error_share)
+    yield from _over_confident(check)
+    at_bounds, beyond_runs = _at_ends(problem, emulator, posterior)
     if beyond_runs:
         yield ResultWarning(
             f"the posterior lies beyond the runs of the model in {_listed(beyond_runs)}: the emulator extrapolates "
@@ -129,13 +154,14 @@ def calibration_warnings(calibration: Calibration) -> Iterator[ResultWarning]:
         )
 
 
-def _no_parameters_fit(calibration: Calibration) -> Iterator[ResultWarning]:
+def _no_parameters_fit(
+    problem: Problem, emulator: Emulator, posterior: SampledPosterior, likelihood: Likelihood
+) -> Iterator[ResultWarning]:
     """Yield a warning where the measurements cannot be what the model gives at any parameters, beyond all errors."""
     from scipy.special import gammaincc
 
-    problem, likelihood, draws = calibration.problem, calibration.likelihood, calibration.draws(DRAWS_NEAR_FAILURES)
-    measured, size = problem.measured, len(problem.measured)
-    points, outputs = calibration.runs.good
+    draws, measured, size = posterior.thinned(DRAWS_NEAR_FAILURES), problem.measured, len(problem.measured)
+    points, outputs = emulator.runs.good
     at_draws = likelihood.misfits(draws)
     of_discrepancy = np.tile(draws[int(at_draws.argmin()), points.shape[1] :], (len(points), 1))
     misfit = min(at_draws.min(), likelihood.misfits(np.hstack([points, of_discrepancy])).min())
@@ -189,12 +215,11 @@ def _is_out_of_reach(problem: Problem, beyond: FloatArray, widths: FloatArray) -
     return bool(is_absorbed and (beyond > 0).mean() > MAX_SHARE_OUT_OF_REACH)
 
 
-def _without_effect(calibration: Calibration) -> Iterator[str]:
+def _without_effect(problem: Problem, posterior: SampledPosterior, totals: Mapping[str, float]) -> Iterator[str]:
     """Yield the parameters on which the outputs do not depend, and that the measurements leave where they were."""
-    for symbol, prior in calibration.problem.forward_priors.items():
-        if calibration.sensitivity["total"][symbol] < MIN_EFFECT:
-            both = prior, calibration.marginals[symbol]
-            prior_width, width = (of.quantile(0.75) - of.quantile(0.25) for of in both)
+    for symbol, prior in problem.forward_priors.items():
+        if totals[symbol] < MIN_EFFECT:
+            prior_width, width = (of.quantile(0.75) - of.quantile(0.25) for of in (prior, posterior.marginals[symbol]))
             if width > MIN_SHARE_OF_PRIOR * prior_width:
                 yield symbol
 
@@ -236,28 +261,33 @@ def _noise_is_misfit(problem: Problem, predicted: FloatArray) -> bool:
     return False
 
 
-def _error_share(calibration: Calibration) -> float:
+def _error_share(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> float:
     """Return the emulator's error at the posterior over the measurements (root mean squares), zero below the noise.
 
     The largest of all quantities.
     """
-    problem, share = calibration.problem, 0.0
-    draws = calibration.draws(DRAWS_NEAR_FAILURES)[:, : len(problem.forward_symbols)]
-    variances = np.diagonal(calibration.emulator.moments(draws)[1], axis1=1, axis2=2)
+    draws, share = posterior.thinned(DRAWS_NEAR_FAILURES), 0.0
+    variances = np.diagonal(emulator.moments(draws[:, : len(problem.forward_symbols)])[1], axis1=1, axis2=2)
     for name, (start, stop) in problem.quantities.items():
         error = float(np.median(np.sqrt(variances[:, start:stop].mean(axis=1))))
-        noise_sd = problem.noise_sd[name] or calibration.marginals[symbol_of(NOISE_SD.symbol, name)].mean
+        noise_sd = problem.noise_sd[name] or posterior.marginals[symbol_of(NOISE_SD.symbol, name)].mean
         if error > noise_sd:
             share = max(share, error / float(_rms(problem.measured[start:stop])))
     return share
 
 
-def _large_error(calibration: Calibration, error_share: float) -> Iterator[ResultWarning]:
+def _large_error(
+    problem: Problem,
+    posterior: SampledPosterior,
+    exact: SampledPosterior,
+    emulator_share: Mapping[str, float],
+    error_share: float,
+) -> Iterator[ResultWarning]:
     """Yield a warning where the emulator's error widens or shifts the posterior notably, or hides all there is."""
-    forward, emulator_share = calibration.problem.forward_symbols, calibration.emulator_share
+    forward = problem.forward_symbols
     shifts = {
-        symbol: abs(calibration.without_emulator_error.marginals[symbol].mean - marginal.mean) / marginal.sd
-        for symbol, marginal in calibration.marginals.items()
+        symbol: abs(exact.marginals[symbol].mean - marginal.mean) / marginal.sd
+        for symbol, marginal in posterior.marginals.items()
     }
     largest_share = max(forward, key=lambda symbol: emulator_share[symbol])
     largest_shift = max(forward, key=lambda symbol: shifts[symbol])
@@ -296,23 +326,22 @@ def _over_confident(check: EmulatorCheck) -> Iterator[ResultWarning]:
         )
 
 
-def _share_near_failures(calibration: Calibration) -> float:
+def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> float:
     """Return the share of the posterior whose nearest run failed, in the unit box of the runs."""
-    runs, coordinates = calibration.runs, calibration.emulator.coordinates
-    draws = calibration.draws(DRAWS_NEAR_FAILURES)[:, : len(runs.symbols)]
+    runs, coordinates = emulator.runs, emulator.coordinates
+    draws = posterior.thinned(DRAWS_NEAR_FAILURES)[:, : len(runs.symbols)]
     run_points, draw_points = coordinates.of(runs.points), coordinates.of(draws)
     nearest = ((draw_points[:, None] - run_points[None]) ** 2).sum(axis=2).argmin(axis=1)
     return float(runs.failed[nearest].mean())
 
 
-def _at_ends(calibration: Calibration) -> tuple[Ends, Ends]:
+def _at_ends(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> tuple[Ends, Ends]:
     """Return where the posterior is at bounds of priors, and where more of it than of the prior is beyond all runs.
 
     Where runs of a narrower prior are all that the emulator knows, any of it.
     """
     at_bounds, beyond_runs = Ends(), Ends()
-    problem, posterior = calibration.problem, calibration.posterior
-    for symbol, column in zip(problem.forward_symbols, calibration.runs.points.T, strict=True):
+    for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
         prior, values = problem.priors[symbol], posterior.values[:, problem.symbols.index(symbol)]
         prior_values = np.asarray(prior.quantile((np.arange(PRIOR_POINTS) + 0.5) / PRIOR_POINTS))
         run_ends, signs = (float(column.min()), float(column.max())), (1.0, -1.0)
