@@ -43,6 +43,18 @@ def test_a_stage_imports_only_stages_to_its_left(file):
     assert not imports_of(file) & set(later)
 
 
+def test_no_two_modules_import_each_other_even_for_types():
+    files = {file: file.relative_to(ROOT.parent).with_suffix("") for file in ROOT.rglob("*.py")}
+    module_of = {file: ".".join(path.parts).removesuffix(".__init__") for file, path in files.items()}
+    imports = {module: set() for module in module_of.values()}
+    for file, module in module_of.items():
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = {f"{node.module}.{name.name}" for name in node.names}
+                imports[module] |= names & imports.keys() or {node.module} & imports.keys()
+    assert not [(one, other) for one in imports for other in imports[one] if one in imports[other]]
+
+
 def test_a_name_that_begins_with_an_underscore_is_of_its_module_alone():
     for file in ROOT.rglob("*.py"):
         nodes = [
