@@ -40,7 +40,7 @@ MAX_CLIMBS, CLIMBED_HEIGHT = 8, 0.5
 """Climbs one after another, each in steps of the width where the last ended, and what the last gains of log density."""
 RIDGE_RATIO = 5.0
 """Width of a part along its longest axis over that along the next one, from which it lies on a ridge."""
-RIDGE_STEP, MAX_RIDGE_STEPS, RIDGE_LOG_DROP = 0.4, 12, 10.0
+RIDGE_STEP, MAX_RIDGE_STEPS, RIDGE_LOG_DROP = 0.2, 24, 10.0
 """Length of a step along a ridge, in sds of the prior, how many there are each way, and the log density below the peak
 at which they end."""
 MIN_STEP_RATIO, MAX_STEP_RATIO = 0.2, 4.0
