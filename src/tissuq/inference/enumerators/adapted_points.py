@@ -39,7 +39,7 @@ COINCIDENT = 0.5
 MAX_CLIMBS, CLIMBED_HEIGHT = 8, 0.5
 """Climbs one after another, each in steps of the width where the last ended, and what the last gains of log density."""
 RIDGE_RATIO = 5.0
-"""Width of a part along its longest axis over that along the next one, from which it lies on a ridge."""
+"""Width of a proposal along its longest axis over that along the next one, from which it lies on a ridge."""
 RIDGE_STEP, MAX_RIDGE_STEPS, RIDGE_LOG_DROP = 0.2, 24, 10.0
 """Length of a step along a ridge, in sds of the prior, how many there are each way, and the log density below the peak
 at which they end."""
@@ -138,22 +138,22 @@ class AdaptedPoints:
 
 
 def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> Mixture:
-    """Return a mixture with a part around each place to which a climb from a good point of the prior has come.
+    """Return a mixture with a proposal around each place to which a climb from a good point of the prior has come.
 
-    And with parts along the ridges on which these lie.
+    And with proposals along the ridges on which these lie.
     """
     climbed = list(_climbed(log_density, _feet(log_density, dimension)))
     largest = max(log_mass for log_mass, _ in climbed)
-    parts, on_ridges = list[Proposal](), list[Proposal]()
-    for log_mass, part in climbed:
-        scores = [np.linalg.solve(other.root, part.mean - other.mean) for other in parts]
+    proposals, on_ridges = list[Proposal](), list[Proposal]()
+    for log_mass, proposal in climbed:
+        scores = [np.linalg.solve(other.root, proposal.mean - other.mean) for other in proposals]
         if log_mass >= largest - RELEVANT_LOG_DROP and all(np.linalg.norm(score) > COINCIDENT for score in scores):
-            parts.append(part)
-    for part in parts:
-        if all(np.linalg.norm(part.mean - other.mean) > RIDGE_STEP for other in on_ridges):
-            on_ridges += _along_ridge(log_density, part)
-    parts += on_ridges
-    return [(1 / len(parts), part) for part in parts]
+            proposals.append(proposal)
+    for proposal in proposals:
+        if all(np.linalg.norm(proposal.mean - other.mean) > RIDGE_STEP for other in on_ridges):
+            on_ridges += _along_ridge(log_density, proposal)
+    proposals += on_ridges
+    return [(1 / len(proposals), proposal) for proposal in proposals]
 
 
 def _feet(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> FloatArray:
@@ -189,25 +189,25 @@ def _climbed(log_density: Callable[[FloatArray], FloatArray], peaks: FloatArray)
         last_heights = heights
 
 
-def _along_ridge(log_density: Callable[[FloatArray], FloatArray], part: Proposal) -> Iterator[Proposal]:
-    """Yield parts both ways along the ridge on which one lies, if it does: each a step on, and climbed across it."""
-    values, axes = np.linalg.eigh(part.root @ part.root.T)
+def _along_ridge(log_density: Callable[[FloatArray], FloatArray], proposal: Proposal) -> Iterator[Proposal]:
+    """Yield proposals both ways along the ridge on which one lies, if it does: each a step on, then climbed across."""
+    values, axes = np.linalg.eigh(proposal.root @ proposal.root.T)
     if len(values) == 1 or values[-1] < RIDGE_RATIO**2 * values[-2]:
         return
-    least_height = log_density(part.mean[None])[0] - RIDGE_LOG_DROP
+    least_height = log_density(proposal.mean[None])[0] - RIDGE_LOG_DROP
     for direction in (axes[:, -1], -axes[:, -1]):
-        place, across = part.mean, axes[:, :-1] * np.sqrt(values[:-1])
+        centre, across = proposal.mean, axes[:, :-1] * np.sqrt(values[:-1])
         for _ in range(MAX_RIDGE_STEPS):
-            start = place + RIDGE_STEP * direction
+            start = centre + RIDGE_STEP * direction
             on_plane = partial(_across, log_density, start, across)
             *_, (_, peak) = _climbed(on_plane, np.zeros((1, across.shape[1])))
-            height, step = on_plane(peak.mean[None])[0], start + across @ peak.mean - place
+            height, step = on_plane(peak.mean[None])[0], start + across @ peak.mean - centre
             length = np.linalg.norm(step)
             if not (height > least_height and MIN_STEP_RATIO < length / RIDGE_STEP < MAX_STEP_RATIO):
                 break
-            place, direction, root = place + step, step / length, across @ peak.root
+            centre, direction, root = centre + step, step / length, across @ peak.root
             covariance = root @ root.T
-            yield Proposal(place, np.asarray(np.linalg.cholesky(covariance + np.outer(step, step))))
+            yield Proposal(centre, np.asarray(np.linalg.cholesky(covariance + np.outer(step, step))))
             off_direction = np.eye(len(step)) - np.outer(direction, direction)
             variances, axes_across = np.linalg.eigh(off_direction @ covariance @ off_direction)
             across = axes_across[:, 1:] * np.sqrt(variances[1:])

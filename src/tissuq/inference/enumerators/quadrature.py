@@ -244,21 +244,21 @@ def _beside_ridges(cells: Cells, top: FloatArray, shares: FloatArray) -> tuple[I
     order, upper = ORDERS[dimension], cells.lower + cells.width
     logs = (cells.log_values - top[:, None, None]).max(axis=0).reshape(-1, *[order] * dimension)
     nodes, sides_of_cell = gauss_rule(order)[0], dict[int, int]()
-    for row in np.flatnonzero(shares.max(axis=0) > MIN_RIDGE_SHARE):
-        for side, is_upper in product(range(dimension), (True, False)):
-            layer = np.take(logs[row], -1 if is_upper else 0, axis=side)
-            if layer.max() < -MAX_RIDGE_DROP:
-                continue
-            place = np.insert(nodes[list(np.unravel_index(layer.argmax(), layer.shape))], side, float(is_upper))
-            place = cells.lower[row] + place * cells.width[row]
-            is_touching = (cells.lower if is_upper else upper)[:, side] == place[side]
-            others = np.arange(dimension) != side
-            is_beside = ((cells.lower <= place) & (place < upper))[:, others].all(axis=1) & is_touching
-            for beside in np.flatnonzero(is_beside):
-                ratios = np.where(others, cells.width[beside] / cells.width[row], 0.0)
-                drop = layer.max() - np.take(logs[beside], 0 if is_upper else -1, axis=side).max()
-                if drop > MAX_RIDGE_DROP and ratios.max() > MAX_WIDTH_RATIO:
-                    sides_of_cell[int(beside)] = int(ratios.argmax())
+    heavy = np.flatnonzero(shares.max(axis=0) > MIN_RIDGE_SHARE)
+    for row, side, is_upper in product(heavy, range(dimension), (True, False)):
+        layer = np.take(logs[row], -1 if is_upper else 0, axis=side)
+        if layer.max() < -MAX_RIDGE_DROP:
+            continue
+        largest = np.unravel_index(layer.argmax(), layer.shape)
+        crossing = cells.lower[row] + np.insert(nodes[list(largest)], side, float(is_upper)) * cells.width[row]
+        is_touching = (cells.lower if is_upper else upper)[:, side] == crossing[side]
+        is_transverse = np.arange(dimension) != side
+        has_crossing = ((cells.lower <= crossing) & (crossing < upper))[:, is_transverse].all(axis=1)
+        for neighbour in np.flatnonzero(is_touching & has_crossing):  # one, or none where the cube ends
+            ratios = np.where(is_transverse, cells.width[neighbour] / cells.width[row], 0.0)
+            drop = layer.max() - np.take(logs[neighbour], 0 if is_upper else -1, axis=side).max()
+            if drop > MAX_RIDGE_DROP and ratios.max() > MAX_WIDTH_RATIO:
+                sides_of_cell[int(neighbour)] = int(ratios.argmax())
     rows = np.array(sorted(sides_of_cell), dtype=np.intp)
     return rows, np.array([sides_of_cell[row] for row in rows], dtype=np.intp)
 
