@@ -10,6 +10,7 @@ import pytest
 import tissuq as tq
 from marks import slow_but
 from tissuq.assessment.modulus import modulus
+from tissuq.inference.solution import Representation
 
 STRETCH = np.linspace(0.75, 1.7, 20)
 
@@ -39,7 +40,7 @@ def test_a_single_draw_among_gaussians_takes_their_width():
     solution = tq.fit(measured(), material="ogden-1", discrepancy="none", noise_sd=0.03).solution
     mixture, root = solution.mixture, solution.mixture.root.copy()
     root[0] = 0.0
-    found = modulus(replace(solution, represent=lambda: replace(mixture, root=root)))
+    found = modulus(replace(solution, representation=Representation.of(replace(mixture, root=root))))
     assert found.hdi() == pytest.approx(modulus(solution).hdi(), rel=1e-3)
 
 

@@ -28,7 +28,7 @@ def inseparable_parameters(solution: Solution) -> tuple[str, ...]:
     model = solution.model
     if not model.bent_symbols:
         return ()
-    mixture = solution.few_components(COMPONENTS, wide=False)
+    mixture = solution.few_components(COMPONENTS)
     linear = [symbol for symbol in model.column_symbols if symbol in model.material_symbols]
     columns = [model.column_symbols.index(symbol) for symbol in linear]
     sizes, bent = coefficients(model, mixture)[0][:, columns], values_of(model, mixture, model.bent_symbols)[0]

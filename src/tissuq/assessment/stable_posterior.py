@@ -13,7 +13,7 @@ from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
 from tissuq.inference.gaussian_mixture import CHAINS, GaussianMixture
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.solution import Marginals, Solution, shares_of_members
+from tissuq.inference.solution import Marginals, Representation, Solution, shares_of_members
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import values_of
 
@@ -84,7 +84,7 @@ def stable_part(unconstrained: Solution, modes: Sequence[str], seed: int) -> Sol
         model,
         unconstrained.route,
         reason,
-        lambda: mixture,
+        Representation.of(mixture),
         Marginals.of(model, marginal),
         sampled=mixture.mean[: CHAINS * per_chain].reshape(CHAINS, per_chain, -1),
         diagnostics=unconstrained.diagnostics,

@@ -15,7 +15,7 @@ from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal
-from tissuq.inference.solution import Diagnostics, Marginals, Solution
+from tissuq.inference.solution import Diagnostics, Marginals, Representation, Solution
 from tissuq.mechanics import Material, engineering_stress, material_named
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.noise import KnownNoise
@@ -92,7 +92,7 @@ def material_posterior(
         CALIBRATION,
         f"the parameters of a forward model that was calibrated on {len(problem.measured)} measurements "
         f"through an emulator of {runs} runs",
-        lambda: mixture,
+        Representation.of(mixture),
         Marginals.of(model, lambda symbol: marginals[symbol]),
         seed=seed,
         sampled=linear.reshape(chains, count, -1),

@@ -137,9 +137,9 @@ class GaussianMixture:
         picked = self[heavy[systematic(weights[None], count)[0]]]
         return picked.weighted(np.full(count, 1 / count))
 
-    def resampled(self, count: int) -> GaussianMixture:
+    def resampled(self, count: int | None) -> GaussianMixture:
         """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""
-        if len(self.weights) <= count:
+        if count is None or len(self.weights) <= count:
             return self
         representatives = self[systematic(self.weights[None], count)[0]]
         return representatives.weighted(np.full(count, self.weights.sum() / count))

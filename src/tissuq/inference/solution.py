@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -77,6 +77,28 @@ class Marginals(Mapping[str, Marginal]):
 
 
 @dataclass(frozen=True, eq=False)
+class Representation:
+    """A posterior as a mixture of Gaussians, which is computed when it is first asked for.
+
+    Attributes
+    ----------
+    compute : callable
+        Given how many components there may be (None: as many as serve), returns the mixture.
+    compute_wide : callable, optional
+        The same with components in the tails, too, where importance weights may need them; None where the mixture has
+        them.
+    """
+
+    compute: Callable[[int | None], GaussianMixture]
+    compute_wide: Callable[[int | None], GaussianMixture] | None = None
+
+    @classmethod
+    def of(cls, mixture: GaussianMixture, wide: GaussianMixture | None = None) -> Representation:
+        """Return that of a posterior which is a mixture, and another one with components in the tails."""
+        return cls(mixture.resampled, None if wide is None else wide.resampled)
+
+
+@dataclass(frozen=True, eq=False)
 class Solution:
     """The posterior of one model, by any route.
 
@@ -87,12 +109,10 @@ class Solution:
         Which method was used.
     reason : str
         Why it was taken and what it did.
-    represent : callable
-        Returns the posterior as a mixture of Gaussians; called once, when `mixture` is first needed.
+    representation : Representation
+        The posterior as a mixture of Gaussians.
     marginals : mapping of str to Marginal
         One for each parameter, by its symbol.
-    represent_tails : callable, optional
-        The same with more components in the tails, for `wide_mixture`.
     seed : int
         Of the draws from the mixture.
     sampled : (chains, draws, p) array, optional
@@ -112,17 +132,13 @@ class Solution:
         The same of the prior; None where it is not known.
     is_of_data : bool
         Whether it is the posterior given the model's measurements; that of a new patient is of somebody else.
-    represent_few : callable, optional
-        Given a number of components and whether those of the tails are wanted, returns what `few_components` does, at
-        less cost.
     """
 
     model: StatisticalModel
     route: str
     reason: str
-    represent: Callable[[], GaussianMixture]
+    representation: Representation
     marginals: Mapping[str, Marginal]
-    represent_tails: Callable[[], GaussianMixture] | None = None
     seed: int = 0
     sampled: FloatArray | None = None
     log_evidence: float | None = None
@@ -133,34 +149,31 @@ class Solution:
     stable_share: float = 1.0
     stable_prior_share: float | None = None
     is_of_data: bool = True
-    represent_few: Callable[[int, bool], GaussianMixture] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is computed in place of what computes it, so that the posterior can go to another process."""
-        tails = None if self.represent_tails is None else partial(_same, self.wide_mixture)
-        computed = {"represent": partial(_same, self.mixture), "represent_tails": tails}
-        return self.__dict__ | computed | {"marginals": dict(self.marginals), "represent_few": None}
+        representation = Representation.of(self.mixture, self.wide_mixture if self.has_wide_mixture else None)
+        return self.__dict__ | {"representation": representation, "marginals": dict(self.marginals)}
 
     @cached_property
     def mixture(self) -> GaussianMixture:
         """The posterior as a mixture; predictions rest on it."""
-        with one_thread():
-            return self.represent()
+        return self.few_components(None)
 
     @cached_property
     def wide_mixture(self) -> GaussianMixture:
         """The same with components in the tails, too, where importance weights may need them."""
-        if self.represent_tails is None:
-            return self.mixture
-        with one_thread():
-            return self.represent_tails()
+        return self.few_components(None, is_wide=True) if self.has_wide_mixture else self.mixture
 
-    def few_components(self, count: int, *, wide: bool) -> GaussianMixture:
+    @property
+    def has_wide_mixture(self) -> bool:
+        """Whether `wide_mixture` is another one than `mixture`."""
+        return self.representation.compute_wide is not None
+
+    def few_components(self, count: int | None, *, is_wide: bool = False) -> GaussianMixture:
         """Return at most so many components that stand for `mixture`, or for `wide_mixture`; neither is kept."""
         with one_thread():
-            if self.represent_few is not None:
-                return self.represent_few(count, wide)
-            return ((self.represent_tails if wide else None) or self.represent)().resampled(count)
+            return ((self.representation.compute_wide if is_wide else None) or self.representation.compute)(count)
 
     @cached_property
     def draws(self) -> dict[str, FloatArray]:
@@ -256,10 +269,6 @@ class Enumerator(Protocol):
         ConvergenceError
             When they are not found to the enumerator's tolerance.
         """
-
-
-def _same(mixture: GaussianMixture) -> GaussianMixture:
-    return mixture
 
 
 def shares_of_members(model: StatisticalModel, members: IndexArray, weights: FloatArray) -> dict[str, float]:

@@ -12,7 +12,7 @@ from tissuq.drawing.panels import Panels, columns_of, limits_of, on_figure, shor
 from tissuq.drawing.pieces import band, cut_off, line, points
 from tissuq.drawing.style import BAND, BASE, INK, MARKERS, STYLE, TRUTH, inline_svg, new_figure, relative_size
 from tissuq.experiments.units import StressUnit
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import Representation, Solution
 from tissuq.pictures.curves import Described, has_discrepancy, is_determined, points_along, share_along, ways_of
 from tissuq.prediction.bands import predict_band
 
@@ -87,10 +87,10 @@ def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) ->
 
 def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     """Return the first measured curve and its band as a small SVG, at little cost: few components make the band."""
-    curves, mixture = solution.model.experiment.curves, solution.mixture.thinned(FEW)
+    curves = solution.model.experiment.curves
     curve, count = curves[0], f", 1 of {len(curves)}" if len(curves) > 1 else ""
     across = points_along(curve, SMALL_POINTS)
-    rough = replace(solution, represent=lambda: mixture)
+    rough = replace(solution, representation=Representation.of(solution.mixture.thinned(FEW)))
     of_curve = predict_band(rough, across, mode=curve.mode, channel=curve.channel)
     low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
     measured = curve.stress / unit.to_mpa

@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import marginal_of_points
-from tissuq.inference.solution import Diagnostics, Marginals, Solution
+from tissuq.inference.solution import Diagnostics, Marginals, Representation, Solution
 from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.statistical_model import StatisticalModel
@@ -83,7 +83,7 @@ def patient_posterior(population: PopulationDraws) -> Posterior:
         model,
         "population",
         f"a new specimen of the population of {names}; what is not pooled is that of a random specimen{left_out}",
-        lambda: mixture,
+        Representation.of(mixture),
         Marginals.of(model, lambda symbol: marginal_of_points(columns[symbol], mixture.weights, support[symbol])),
         sampled=linear.reshape(chains, draws, -1),
         diagnostics=_diagnostics(hierarchy, values.reshape(chains, draws, -1), model.symbols),

@@ -16,7 +16,7 @@ from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal
-from tissuq.inference.solution import Diagnostics, Solution
+from tissuq.inference.solution import Diagnostics, Representation, Solution
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.relative_stiffness import for_states
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
@@ -239,7 +239,7 @@ def solution_groups(solution: Solution, solver: Solver) -> dict[str, LabelledGro
         MIXTURE: LabelledGroup(solution.mixture.to_arrays()),
         MARGINALS: LabelledGroup(tables, attrs={"moments": json.dumps(moments)}),
     }
-    if solution.represent_tails is not None:
+    if solution.has_wide_mixture:
         groups[WIDE_MIXTURE] = LabelledGroup(solution.wide_mixture.to_arrays())
     recorded = groups | _model_groups(solution.model)
     return {FIT: LabelledGroup(attrs={"format": FORMAT})} | {f"{FIT}/{name}": group for name, group in recorded.items()}
@@ -314,8 +314,7 @@ def _solution(groups: Mapping[str, Group], model: StatisticalModel) -> Solution:
     diagnostics = plain.pop("diagnostics")
     return Solution(
         model,
-        represent=lambda: mixture,
-        represent_tails=None if tails is None else lambda: tails,
+        representation=Representation.of(mixture, tails),
         marginals={symbol: Marginal(*moments[symbol], *tables.arrays[symbol]) for symbol in model.symbols},
         sampled=sampled,
         diagnostics=None if diagnostics is None else Diagnostics(**diagnostics),

@@ -14,7 +14,7 @@ from tissuq.assessment.stability import calibrated_range, stability_modes, stabl
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.solution import Solution, are_isotropic
+from tissuq.inference.solution import Representation, Solution, are_isotropic
 from tissuq.mechanics.draws import PiecewiseEnergy, continuations, pieces, rays_to_ends
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.mechanics.rays import MAX_CORNER_EXCESS, Range, scores, through, with_errors
@@ -123,7 +123,7 @@ def _isotropic(solution: Solution) -> Solution:
         )
     isotropic = solution.mixture[np.flatnonzero(are_isotropic(solution.model, solution.mixture))]
     mixture = isotropic.weighted(isotropic.weights / isotropic.weights.sum())
-    return replace(solution, represent=lambda: mixture)
+    return replace(solution, representation=Representation.of(mixture))
 
 
 def _points(

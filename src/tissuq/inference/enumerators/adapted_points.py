@@ -19,7 +19,7 @@ from tissuq.inference.linear import ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.proposal_mixture import Mixture, fitted, weighted_points
 from tissuq.inference.quasi_monte_carlo import Proposal, effective, even_points, log_normal
-from tissuq.inference.solution import Marginals, Solution
+from tissuq.inference.solution import Marginals, Representation, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
@@ -121,15 +121,11 @@ class AdaptedPoints:
 
         linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
         reason = f"{linear}; a sum over {len(weights)} points of {', '.join(model.nonlinear)} ({number:.0f} effective)"
-        solution = Solution(
-            model,
-            "exact",
-            reason,
-            lambda: truncated.components(MAX_COMPONENTS),
-            Marginals.of(model, marginal),
-            truncated.components,
-            seed,
+        representation = Representation(
+            lambda count: truncated.components(MAX_COMPONENTS).resampled(count),
+            lambda count: truncated.components().resampled(count),
         )
+        solution = Solution(model, "exact", reason, representation, Marginals.of(model, marginal), seed)
         if model.is_improper:
             return solution
         _, error_of_mass = truncated.checked_masses(model.linear)

@@ -32,7 +32,7 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
 from tissuq.inference.reduction import BasesOf, bases_of
-from tissuq.inference.solution import Marginals, Solution
+from tissuq.inference.solution import Marginals, Representation, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
@@ -249,8 +249,9 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
     integrated = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
     cut = "; bounds of the linear parameters cut the posterior and were honoured" if truncated.is_cut else ""
+    representation = Representation(lambda count: truncated.components().resampled(count))
     solution = Solution(
-        model, "exact", f"{linear}; {integrated}{cut}", truncated.components, Marginals.of(model, marginal), seed=seed
+        model, "exact", f"{linear}; {integrated}{cut}", representation, Marginals.of(model, marginal), seed
     )
     if model.is_improper:
         return solution

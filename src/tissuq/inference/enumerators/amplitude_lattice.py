@@ -33,7 +33,7 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
 from tissuq.inference.quasi_monte_carlo import systematic
-from tissuq.inference.solution import Marginals, Solution, shares_of_members
+from tissuq.inference.solution import Marginals, Representation, Solution, shares_of_members
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
@@ -204,14 +204,12 @@ class _EnergySums:
             self.model,
             "exact",
             self._reason(),
-            partial(self._represented, 1.0, components),
+            Representation(*(partial(self._represented, power, components) for power in (1.0, TAILS_POWER))),
             Marginals.of(self.model, partial(self._marginal, max(1, components // MARGINAL_DIVISOR))),
-            partial(self._represented, TAILS_POWER, components),
             seed,
             log_evidence=log_evidence,
             log_evidence_error=error,
             members=shares_of_members(self.model, self._points.lattice, self._weights),
-            represent_few=lambda few, wide: self._represented(TAILS_POWER if wide else 1.0, components, few),
         )
 
     def _reason(self) -> str:
@@ -227,7 +225,7 @@ class _EnergySums:
             f", and over {len(self._nodes)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
         )
 
-    def _represented(self, power: float, count: int, few: int | None = None) -> GaussianMixture:
+    def _represented(self, power: float, count: int, few: int | None) -> GaussianMixture:
         """Return so many components that stand for all points, taken as often as a power of their weights says.
 
         Or the ``few`` that stand for these, the others of which need not be computed where no bound cuts any.

@@ -18,7 +18,7 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import OF_SUM, ROUGH, Accuracy
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, blended, marginal_of_table
-from tissuq.inference.solution import Marginals, Solution
+from tissuq.inference.solution import Marginals, Representation, Solution
 from tissuq.model.noise import NOISE_SD, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
@@ -232,9 +232,10 @@ def _joined(
         model.with_errors(level=float(np.exp(shares @ logs))),
         solutions[best].route,
         f"the noise integrated over {len(solutions)} values; at each of them {solutions[best].reason}",
-        partial(_represented, model, solutions, shares, logs, wide=False),
+        Representation(
+            *(partial(_represented, model, solutions, shares, logs, is_wide=is_wide) for is_wide in (False, True))
+        ),
         Marginals(model.symbols, marginal),
-        partial(_represented, model, solutions, shares, logs, wide=True),
         seed,
         log_evidence=float(log_weights.max() + np.log(total)),
         log_evidence_error=float(shares @ [solution.log_evidence_error or 0.0 for solution in solutions])
@@ -308,16 +309,22 @@ def _masses(logs: FloatArray, heights: FloatArray) -> FloatArray:
 
 
 def _represented(
-    model: StatisticalModel, solutions: Sequence[Solution], shares: FloatArray, logs: FloatArray, *, wide: bool
+    model: StatisticalModel,
+    solutions: Sequence[Solution],
+    shares: FloatArray,
+    logs: FloatArray,
+    count: int | None,
+    *,
+    is_wide: bool,
 ) -> GaussianMixture:
     """Return the components of all solutions, fewer of those of less weight."""
     mixtures = []
     for solution, share, log in zip(solutions, shares, logs, strict=True):
-        components = solution.few_components(max(1, int(share * MAX_COMPONENTS)), wide=wide)
+        components = solution.few_components(max(1, int(share * MAX_COMPONENTS)), is_wide=is_wide)
         values = dict(zip(solution.model.nonlinear, components.settings.T, strict=True))
         values[SYMBOL] = np.full(len(components), np.exp(log))
         settings = np.column_stack([values[symbol] for symbol in model.nonlinear])
         mixtures.append(
             replace(components, settings=settings, weights=share * components.weights / components.weights.sum())
         )
-    return GaussianMixture.of_all(mixtures)
+    return GaussianMixture.of_all(mixtures).resampled(count)

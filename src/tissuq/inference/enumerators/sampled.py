@@ -19,7 +19,7 @@ from tissuq.inference.enumerators.smc import SmcDraws, SmcSettings, sample_smc
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.quasi_monte_carlo import resampled_at_random
-from tissuq.inference.solution import Diagnostics, Marginals, Solution
+from tissuq.inference.solution import Diagnostics, Marginals, Representation, Solution
 from tissuq.model.statistical_model import StatisticalModel
 
 MAX_CORRELATED = 1000
@@ -232,7 +232,7 @@ def _solution(
             return mixture.marginal(model.linear.index(symbol))
         return marginal_of_points(solution.draws[symbol].ravel(), mixture.weights, model.priors[symbol].support)
 
-    solution = Solution(model, route, reason, lambda: mixture, Marginals.of(model, marginal), sampled=linear)
+    solution = Solution(model, route, reason, Representation.of(mixture), Marginals.of(model, marginal), sampled=linear)
     return replace(solution, diagnostics=_diagnostics(solution.draws, sampled))
 
 
