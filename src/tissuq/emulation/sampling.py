@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import islice
 from typing import get_args
 
 import numpy as np
@@ -15,8 +16,8 @@ from tissuq.emulation.problem import Method
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.proposal_mixture import weighted_points
-from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, adapted, effective, log_normal, systematic
+from tissuq.inference.proposals import adapted, fitted_mixture, weighted_points
+from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, effective, log_normal, sobol_rounds, systematic
 from tissuq.parameters.priors import Prior
 
 SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 16, 32
@@ -143,13 +144,14 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
         [(1.0, adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal)]
         for candidate in (exact, likelihood)
     ]
-    rounds = weighted_points(partial(_log_target, likelihood), searched, ROUND_POINTS, [seed, 43])
+    uniforms = islice(sobol_rounds(size, ROUND_POINTS, [seed, 43]), MAX_ROUNDS)
+    rounds = weighted_points(partial(_log_target, likelihood), searched, uniforms, fitted_mixture)
     for number, weighted in enumerate(rounds, 1):
-        if not weighted[1].max() > LOG_OF_NOTHING:
+        if not weighted.log_weights.max() > LOG_OF_NOTHING:
             raise ConvergenceError("the measurements have no probability at any parameters that the priors allow.")
-        if number == MAX_ROUNDS or (number >= ROUNDS and _suffice(weighted[1])):
+        if number >= ROUNDS and _suffice(weighted.log_weights):
             break
-    return weighted
+    return weighted.points, weighted.log_weights
 
 
 def _suffice(logs: FloatArray) -> bool:

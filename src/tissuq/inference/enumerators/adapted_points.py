@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
-from math import log
 
 import numpy as np
 
@@ -17,8 +16,8 @@ from tissuq.inference.enumerators.survey import climb
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.proposal_mixture import Mixture, fitted, weighted_points
-from tissuq.inference.quasi_monte_carlo import Proposal, effective, even_points, log_normal
+from tissuq.inference.proposals import Mixture, Proposal, fitted_mixture, weighted_points
+from tissuq.inference.quasi_monte_carlo import effective, even_points, log_normal, sobol_rounds
 from tissuq.inference.solution import Marginals, Representation, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.scales import at_scores
@@ -93,19 +92,21 @@ class AdaptedPoints:
         density, dimension = _Density(model), len(model.nonlinear)
         min_effective, log_masses = EFFECTIVE_MULTIPLE * self.accuracy.min_effective, list[float]()
         starts = [self.start or _around_peaks(density, dimension)]
-        rounds = weighted_points(density, starts, 1 << (POINTS_PER_PARAMETER * dimension).bit_length(), seed=0)
-        for done, (points, log_weights) in enumerate(islice(rounds, MAX_ROUNDS), 1):
-            number, log_mass = effective(log_weights), float(np.logaddexp.reduce(log_weights)) - log(len(points))
-            log_masses.append(log_mass)
+        uniforms = sobol_rounds(dimension, 1 << (POINTS_PER_PARAMETER * dimension).bit_length(), seed=0)
+        rounds = weighted_points(density, starts, islice(uniforms, MAX_ROUNDS), fitted_mixture)
+        for done, weighted in enumerate(rounds, 1):
+            number = effective(weighted.log_weights)
+            log_masses.append(weighted.log_mass)
             needed = 2 if self.start else MIN_ROUNDS
             if done >= needed and number >= min_effective and np.ptp(log_masses[-MIN_ROUNDS:]) < MAX_CHANGE:
                 break
         else:
             raise ConvergenceError(
                 f"the posterior of {', '.join(model.nonlinear)} was not found well enough: {number:.0f} of "
-                f"{len(log_weights)} points are effective. Give narrower priors, or use the method 'nuts'."
+                f"{len(weighted.points)} points are effective. Give narrower priors, or use the method 'nuts'."
             )
-        self.start = fitted(points, log_weights)
+        points, log_weights, _ = weighted
+        self.start = fitted_mixture(points, log_weights)
         weights = np.exp(log_weights - log_weights.max())
         weights /= weights.sum()
         matters = weights > NEGLIGIBLE_WEIGHT
@@ -130,7 +131,7 @@ class AdaptedPoints:
             return solution
         _, error_of_mass = truncated.checked_masses(model.linear)
         error = float(np.sqrt(1 / number - 1 / len(log_weights))) + error_of_mass
-        return replace(solution, log_evidence=log_mass, log_evidence_error=error)
+        return replace(solution, log_evidence=weighted.log_mass, log_evidence_error=error)
 
 
 def _around_peaks(log_density: Callable[[FloatArray], FloatArray], dimension: int) -> Mixture:

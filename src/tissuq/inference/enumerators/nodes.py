@@ -12,7 +12,8 @@ from tissuq.inference.enumerators.amplitudes import Points, PointsAtKnownNoise, 
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, MAX_STRESS_RATIO, Directions, Lattice, Rows
 from tissuq.inference.enumerators.line import FINE, Accuracy
 from tissuq.inference.enumerators.outer import Outer
-from tissuq.inference.quasi_monte_carlo import Proposal, systematic
+from tissuq.inference.proposals import Proposal
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 

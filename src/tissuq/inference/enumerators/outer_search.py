@@ -12,7 +12,8 @@ from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.line import first_places, known_along, peaks
 from tissuq.inference.enumerators.nodes import Guide, Node, Sums
 from tissuq.inference.enumerators.outer import TINY, Outer
-from tissuq.inference.quasi_monte_carlo import MAX_SEARCHES, adapted, effective
+from tissuq.inference.proposals import MAX_SEARCHES, adapted
+from tissuq.inference.quasi_monte_carlo import effective
 from tissuq.model.scales import MAX_SCORE
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -116,16 +117,17 @@ class _Search:
             points_taken=guide.points_taken,
         )
         guide.points_taken += len(nodes)
-        is_found = adaptation.is_settled and effective(adaptation.log_weights) >= min_effective
+        points, log_weights, _ = adaptation.weighted
+        is_found = adaptation.is_settled and effective(log_weights) >= min_effective
         if guide.proposal is not None and not is_found:
             guide.proposal, self._members = None, members
             return self.by_proposal(guide)
-        guide.proposal, nodes = adaptation.proposal, nodes[-len(adaptation.points) :]
+        guide.proposal, nodes = adaptation.proposal, nodes[-len(points) :]
         self._check_place(guide.proposal.mean)
-        error = relative_error(self._outer, adaptation.log_weights, min_effective)
+        error = relative_error(self._outer, log_weights, min_effective)
         if not adaptation.is_settled:
             raise _not_found(self._outer, f"the sum still changes after {MAX_SEARCHES} searches")
-        return *_weighted(nodes, adaptation.log_weights - np.log(len(nodes))), error
+        return *_weighted(nodes, log_weights - np.log(len(nodes))), error
 
     def _scouted(self, points: FloatArray) -> FloatArray:
         """Return the logarithms of the density at points (N, d), roughly: from a few of the members."""
