@@ -51,6 +51,8 @@ FIT = [
     (["SPECIMEN", "--prior", "C10"], ["'C10' is not a prior", "C10=uniform(0, 5)"]),
     (["SPECIMEN", "--prior", "C10=uniform(0;5)"], ["numbers", "0;5"]),
     (["SPECIMEN", "--prior", "C10=uniform(5)"], ["uniform", "low, high"]),
+    (["SPECIMEN", "--prior", "C10=uniform(0,low=5)"], ["uniform", "low, high"]),
+    (["SPECIMEN", "--prior", "C10=uniform(0,upper=5)"], ["uniform", "low, high"]),
     (["SPECIMEN", "--prior", "C10=uniform(5,0)"], ["uniform", "low must be less than high"]),
     (["SPECIMEN", "--prior", "C10=uniform(0,nan)"], ["uniform", "high", "nan"]),
     (["SPECIMEN", "--prior", "C10=unifrom(0,5)"], ["'unifrom'", "Did you mean 'uniform'?"]),

@@ -12,7 +12,6 @@ import tissuq as tq
 from marks import slow_but
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.adapted_points import AdaptedPoints, _Density
-from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.proposals import weighted_points
 
 STRETCH = np.linspace(0.75, 1.6, 12)

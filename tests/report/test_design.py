@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import warnings
 from dataclasses import replace
 
@@ -12,11 +13,13 @@ import pytest
 
 import tissuq as tq
 from tissuq.next_test.targets import target_named
+from tissuq.parameters.priors import prior_from
 from tissuq.report.design import _best, _noise_option, design_figure, design_result, design_table
 from tissuq.report.result import Result, Table
 from tissuq.report.writer import write_result
 from tissuq.result_warning import ResultWarning
 from tissuq.studies.design import DesignSettings, DesignStudy
+from tissuq.studies.option_texts import priors
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +76,21 @@ def test_the_next_step_has_the_noise_of_the_fit(options, said):
     tests = [test.labelled(stress_unit=unit) for test, unit in zip(tests, ("kPa", "MPa"), strict=True)]
     model = tq.fit(tests, discrepancy="none", tolerances="as-tested", **options).model
     assert _noise_option(model) == said
+
+
+def test_the_next_step_has_priors_in_the_unit_of_the_data_and_what_must_be_stable(tmp_path):
+    data = tq.simulate("gent", {"mu": 1.0, "Jm": 1.2}, np.linspace(0.75, 1.6, 16), 0.02, seed=1)
+    data, normal = data.labelled(stress_unit="kPa"), tq.Normal(1.0, 0.2, low=0.0)
+    chosen = {"mu": normal, "Jm": tq.Uniform(1.0, 3.0)}
+    posterior = tq.fit(data, material="gent", discrepancy="none", noise_sd=0.02, priors=chosen, stable_in="uniaxial")
+    table = posterior.design(points=(8,), target="modulus")
+    targets, settings = [target_named("modulus", posterior.model)], DesignSettings(run="run", targets=("modulus",))
+    study = DesignStudy(settings, posterior, tuple(targets), table, "same", 0.18)
+    words = shlex.split(design_result(study, settings, tmp_path / "run").next_step)
+    texts = [words[index + 1] for index, word in enumerate(words) if word == "--prior"]
+    of_settings = {symbol: prior_from(prior) for symbol, prior in priors(texts).items()}
+    assert of_settings == {"mu": normal.scaled(1000), "Jm": chosen["Jm"]}
+    assert words[words.index("--stable-in") + 1] == "uniaxial"
 
 
 def test_a_table_beneath_the_answer_has_the_ten_best_tests_and_a_folded_one_has_all(study, tmp_path):

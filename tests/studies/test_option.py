@@ -69,6 +69,11 @@ def test_a_message_names_the_option_as_it_was_typed():
         (tolerances, ["stress=10%", "slack=0.01"], {"stress": 0.1, "slack": 0.01}),
         (tolerances, ["none"], {}),
         (priors, ["C10=uniform(0, 5)"], {"C10": {"distribution": "uniform", "low": 0.0, "high": 5.0}}),
+        (
+            priors,
+            ["a=normal(1, sd = 2, high=3)"],
+            {"a": {"distribution": "normal", "mean": 1.0, "sd": 2.0, "high": 3.0}},
+        ),
     ],
 )
 def test_what_is_typed_is_understood(parse, texts, value):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import isnan
@@ -77,7 +78,8 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     default = {name: SpecimenSettings.model_fields[name].default for name in ("material", "discrepancies")}
     fitted = f" --material {model.material.name}" * (model.material.name != default["material"])
     fitted += f" --discrepancy {model.discrepancy.name}" * ((model.discrepancy.name,) != default["discrepancies"])
-    options = fitted + modes + _noise_option(model) + errors
+    required = "".join(f" --stable-in {mode}" for mode in study.posterior.solution.stable_in)
+    options = fitted + modes + _noise_option(model) + errors + _prior_options(model) + required
     test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=options)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
@@ -93,6 +95,17 @@ def _noise_option(model: StatisticalModel) -> str:
     is_one_for_all = len({*zip(sds, units, strict=True)}) == 1
     of_each = [of_new] if is_one_for_all else [*(sds / units), of_new]
     return " --noise-sd " + ",".join(f"{sd:g}" for sd in of_each)
+
+
+def _prior_options(model: StatisticalModel) -> str:
+    """Return the options for the priors that were chosen for the fit, in the unit of its first file."""
+    to_mpa = stress_unit(model.experiment.tests[0].stress_unit).to_mpa
+    texts = (
+        f"{p.symbol}={model.chosen_priors[p.symbol].scaled(1 / to_mpa if p.unit else 1.0)}"
+        for p in model.parameters
+        if p.symbol in model.chosen_priors
+    )
+    return "".join(f" --prior {shlex.quote(text)}" for text in texts)
 
 
 def design_table(study: DesignStudy, target: Target, limit: int | None = None) -> Table:

@@ -154,15 +154,19 @@ def _prior(text: str) -> tuple[str, dict[str, Any]]:
         raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
     symbol, distribution, numbers = match.groups()
     arguments = fields(find(Prior, "prior distribution", distribution, InputError))
+    names, needed = [field.name for field in arguments], sum(field.default is MISSING for field in arguments)
+    pairs = [number.rpartition("=")[::2] for number in numbers.split(",")] if numbers.strip() else []
     try:
-        values = [float(number) for number in numbers.split(",")] if numbers.strip() else []
+        numbers_by_name = {
+            name.strip() or "".join(names[position : position + 1]): float(number)
+            for position, (name, number) in enumerate(pairs)
+        }
     except ValueError as error:
         raise InputError(f"prior '{text}': the arguments must be numbers, with a decimal point.") from error
-    names, needed = [field.name for field in arguments], sum(field.default is MISSING for field in arguments)
-    if not needed <= len(values) <= len(names):
+    if len(numbers_by_name) < len(pairs) or not {*names[:needed]} <= {*numbers_by_name} <= {*names}:
         optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
         raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
-    return symbol, {"distribution": distribution, **dict(zip(names, values, strict=False))}
+    return symbol, {"distribution": distribution, **numbers_by_name}
 
 
 def tolerances(texts: Sequence[str]) -> dict[str, float]:
