@@ -30,7 +30,7 @@ from tissuq.parameters.normal_interval import log_interval
 MIN_DRAWS = 4000
 """Draws, at least, that represent what bounds cut, in predictions and a posterior's draws, unless fewer are wanted."""
 MAX_COMPONENTS = 200
-"""Components, at most, whose marginals within several bounds are computed."""
+"""Components, at most, whose marginals within several bounds are computed, and whose masses are checked."""
 POINTS_PER_COMPONENT = 1000
 """Points for each of so many components, that stand for all together where more bounds cut than can be integrated."""
 SAME_GAUSSIAN = 0.005
@@ -106,7 +106,9 @@ class TruncatedMixture:
         return GaussianMixture.of_all([self.free, *are_cut], count)
 
     def checked_masses(self, symbols: Sequence[str]) -> tuple[FloatArray, float]:
-        """Return the log masses within bounds of the components that these cut notably, and the error of all.
+        """Return the log masses within bounds of components that these cut notably, and the error of all.
+
+        Of many, some stand for all of them.
 
         Raises
         ------
@@ -114,7 +116,7 @@ class TruncatedMixture:
             When they are not known well enough; the message has the symbols of the parameters.
         """
         weights, outside = self.gaussians.weights, self.mass_beyond.sum(axis=1)
-        heavy = self.gaussians[(weights > HEAVY_SHARE) & (outside > HEAVY_SHARE)]
+        heavy = self.gaussians[(weights > HEAVY_SHARE) & (outside > HEAVY_SHARE)].resampled(MAX_COMPONENTS)
         log_mass, error = self._boxes(heavy).log_mass(heavy.mean, heavy.root)
         error_of_mass = float(heavy.weights @ error + weights @ np.minimum(outside, HEAVY_SHARE))
         if error_of_mass > MAX_LOG_MASS_ERROR:
