@@ -24,7 +24,8 @@ from tissuq.model.scales import at_scores
 from tissuq.model.statistical_model import StatisticalModel
 
 POINTS_PER_PARAMETER = 256
-"""Points of a round for each parameter, about: their number is a power of two."""
+"""Points of a round for each parameter, about: their number is a power of two. Where a similar model is known, and less
+accuracy is asked for, there are fewer."""
 EFFECTIVE_MULTIPLE = 20.0
 """Effective points over those of values that each cost a sum over energies, for which `Accuracy` is made."""
 IRRELEVANT_LOG_DROP = 14.0
@@ -92,9 +93,10 @@ class AdaptedPoints:
         density, dimension = _Density(model), len(model.nonlinear)
         min_effective, log_masses = EFFECTIVE_MULTIPLE * self.accuracy.min_effective, list[float]()
         starts = [self.start or _around_peaks(density, dimension)]
-        uniforms = sobol_rounds(dimension, 1 << (POINTS_PER_PARAMETER * dimension).bit_length(), seed=0)
-        rounds = weighted_points(density, starts, islice(uniforms, MAX_ROUNDS), fitted_mixture)
-        for done, weighted in enumerate(rounds, 1):
+        share = self.accuracy.min_effective / FINE.min_effective if self.start else 1.0
+        count = 1 << int(share * POINTS_PER_PARAMETER * dimension).bit_length()
+        uniforms = islice(sobol_rounds(dimension, count, seed=0), MAX_ROUNDS)
+        for done, weighted in enumerate(weighted_points(density, starts, uniforms, fitted_mixture), 1):
             number = effective(weighted.log_weights)
             log_masses.append(weighted.log_mass)
             needed = 2 if self.start else MIN_ROUNDS
