@@ -135,7 +135,7 @@ def run_specimen(
     (material,) = settings.fitted_laws({settings.material: law} if law else {}).values()
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
-    check_priors(settings, chain.from_iterable(symbols.values()))
+    priors_in_mpa(settings, [material], experiment)  # refuses those of no parameter
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
@@ -251,23 +251,12 @@ def priors_in_mpa(settings: SpecimenSettings, laws: Iterable[Material], experime
     """
     of_fits = (parameters_of(settings, law, name, experiment) for law in laws for name in _names(settings))
     parameters = list(chain.from_iterable(of_fits))
-    check_priors(settings, parameters)
-    return _priors(settings, parameters, stress_unit(experiment.stress_unit))
-
-
-def check_priors(settings: SpecimenSettings, parameters: Iterable[Parameter]) -> None:
-    """Refuse priors of what is none of the parameters of any fit.
-
-    Raises
-    ------
-    InputError
-        When there is one.
-    """
     symbols = dict.fromkeys(parameter.symbol for parameter in parameters)
     if unknown := sorted(settings.priors.keys() - symbols.keys()):
         raise InputError(
             f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(symbols)}."
         )
+    return _priors(settings, parameters, stress_unit(experiment.stress_unit))
 
 
 def _priors(settings: SpecimenSettings, parameters: Iterable[Parameter], unit: StressUnit) -> dict[str, Prior]:
