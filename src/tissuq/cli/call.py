@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -239,7 +239,7 @@ class Call(Generic[Kind, How]):
                 result = result_of(study)
                 record = write_result(result, folder, figures=self.how.figures, target=target)
                 self.monitor.write_log(folder, result.warnings)
-        self._show(record, target)
+        self.show(record, target)
         return study
 
     def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
@@ -248,17 +248,14 @@ class Call(Generic[Kind, How]):
 
         record = write_result(result, folder, figures=figures)
         self.monitor.write_log(folder, result.warnings)
-        self._show(record, folder)
+        self.show(record, folder)
 
-    def _show(self, record: Record, folder: Path) -> None:
+    def show(self, record: Record, folder: Path | None, *, details: bool = False) -> None:
+        """Print the record of a result; of that with --quiet, which leaves all else out, the numbers."""
         from tissuq.report.terminal import print_result
 
-        print_result(record, folder)
-        self.answer(record["numbers"])
-
-    def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:
-        """Print the numbers of a result, with --quiet alone, which leaves all else out."""
-        for number in numbers if self.monitor.is_quiet else ():
+        print_result(record, folder, details=details)
+        for number in record["numbers"] if self.monitor.is_quiet else ():
             remark = f", {number['remark']}" if number["remark"] else ""
             print(f"{number['name'].removesuffix(':')}: {number['text']}{remark}", file=self.out)
 
