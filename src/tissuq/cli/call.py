@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -290,6 +290,8 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
     InputError
         When it is neither.
     """
+    import tomllib
+
     from tissuq.studies.stream import unfinished
 
     recipe = folder / RECIPE
@@ -299,9 +301,10 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
         return
     if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    stored, wanted = _without(recipe.read_text(encoding="utf-8"), free), _without(_recipe(settings), free)
-    if stored != wanted:
-        names = [name for name in {**stored, **wanted} if stored.get(name) != wanted.get(name)]
+    stored, wanted = dict[str, Any](), _plain(settings)
+    with suppress(tomllib.TOMLDecodeError):  # a damaged one has no settings
+        stored = tomllib.loads(recipe.read_text(encoding="utf-8"))
+    if names := [name for name in {**stored, **wanted} if name not in free and stored.get(name) != wanted.get(name)]:
         said = ", ".join(f"{name}: {stored.get(name, 'none')} there, {wanted.get(name, 'none')} here" for name in names)
         raise InputError(
             f"'{folder}' holds a campaign with other settings ({said:.{MAX_LETTERS}}): choose another folder (--out)."
@@ -310,23 +313,14 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
 
 def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
     """Write the recipe atomically, so that a killed campaign can be resumed."""
+    import tomli_w
+
     from tissuq.studies.stream import write_whole
 
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / RECIPE, _recipe(settings))
+    write_whole(folder / RECIPE, tomli_w.dumps(_plain(settings)))
 
 
-def _without(recipe: str, names: frozenset[str]) -> dict[str, Any]:
-    """Return the settings of a recipe without some of them, none where it is damaged."""
-    import tomllib
-
-    try:
-        return {name: value for name, value in tomllib.loads(recipe).items() if name not in names}
-    except tomllib.TOMLDecodeError:
-        return {}
-
-
-def _recipe(settings: BaseModel) -> str:
-    import tomli_w
-
-    return tomli_w.dumps(settings.model_dump(mode="json", exclude_none=True))
+def _plain(settings: BaseModel) -> dict[str, Any]:
+    """Return settings as a recipe has them."""
+    return settings.model_dump(mode="json", exclude_none=True)
