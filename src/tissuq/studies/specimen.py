@@ -32,7 +32,7 @@ from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.scores import judged
-from tissuq.result_warning import ResultWarning, Severity, has_code, merged, most_severe_first
+from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
 from tissuq.studies.fit_settings import ALL, SpecimenSettings
 
 if TYPE_CHECKING:
@@ -88,10 +88,6 @@ class SpecimenStudy:
     def headline(self) -> str:
         """The parameter that summaries put first."""
         return next(iter(self.posteriors.values())).model.headline
-
-    def is_cut_by_prior(self, name: str) -> bool:
-        """Whether a bound of a prior, not the data, determines part of a fit."""
-        return has_code(self.posteriors[name].warnings, "prior-bound")
 
     @property
     def not_converged(self) -> list[str]:
