@@ -198,14 +198,14 @@ def test_a_campaign_refuses_bad_options_before_anything_is_written(refused, here
     refused([words], "study", "coverage", *arguments)
 
 
-def test_a_campaign_goes_on_from_a_kill_before_its_recipe_was_whole(cli, here):
+def test_a_campaign_goes_on_from_a_kill_before_its_recipe_was_whole(cli, done, here):
     (here / "small.toml").write_text(
         'designs = [{ low = 0.7, high = 2.0, points = 9, noise_sd = 0.1 }]\nformulations = ["none"]\n'
         'families = ["yeoh", "gent"]\nreplicates = 2\n'
     )
     (here / "out").mkdir()
     (here / "out" / "run.toml.new").write_text("designs = [")
-    assert cli("study", "coverage", "--config", "small.toml", "--out", "out").status == 0
+    done("study", "coverage", "--config", "small.toml", "--out", "out")
     assert {
         "run.toml",
         "tasks.jsonl",

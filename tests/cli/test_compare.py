@@ -35,9 +35,8 @@ def fits_in(folder):
 
 
 @pytest.mark.slow
-def test_runs_are_compared(cli, two_runs):
-    said = cli("compare", "first", "second", "--out", "compared")
-    assert said.status == 0, said.err
+def test_runs_are_compared(cli, done, two_runs):
+    said = done("compare", "first", "second", "--out", "compared")
     for name in ("first/none", "first/constant", "second/auto"):
         assert name in said.out
     assert "C10, kPa (95 %)" in said.out
@@ -102,19 +101,19 @@ def test_measurements_in_place_of_a_run_are_named_as_such(cli, here, command):
 
 
 @pytest.mark.slow
-def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
+def test_runs_of_one_name_are_kept_apart(done, two_runs, empty_figures):
     (two_runs / "other").mkdir()
     (two_runs / "first").rename(two_runs / "other" / "run")
     (two_runs / "second").rename(two_runs / "run")
-    assert cli("compare", "other/run", "run", "--out", "one").status == 0
+    done("compare", "other/run", "run", "--out", "one")
     assert len(fits_in(two_runs / "one")) == 3
-    assert cli("compare", "other/run/posterior/none.nc", "other/run", "--out", "two").status == 0
+    done("compare", "other/run/posterior/none.nc", "other/run", "--out", "two")
     assert len(fits_in(two_runs / "two")) == 3
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("text", slow_but(["nothing"], ["nothing", "[]", '[{"formulation": "auto"}]']))
-def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, empty_figures, text):
+def test_a_damaged_assessment_leaves_other_priors_unknown(done, two_runs, empty_figures, text):
     (two_runs / "second" / "assessment.json").write_text(text)
-    assert cli("compare", "first/posterior/none.nc", "second", "--out", "compared").status == 0
+    done("compare", "first/posterior/none.nc", "second", "--out", "compared")
     assert fits_in(two_runs / "compared")["second/auto"]["evidence_change_quarter"] == ""

@@ -9,8 +9,8 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 @pytest.fixture
-def run(cli, here, specimen):
-    assert cli("fit", specimen, *ALONE, "--out", "run").status == 0
+def run(done, here, specimen):
+    done("fit", specimen, *ALONE, "--out", "run")
     return here / "run"
 
 

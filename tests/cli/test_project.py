@@ -19,14 +19,14 @@ def test_the_example_project_is_written_and_what_to_type_next_is_said(cli, here)
     assert (here / "brain/data/shear.csv").read_bytes() == datasets.path("brain-cortex-shear").read_bytes()
 
 
-def test_without_a_name_the_folder_is_tissuq_example(cli, here):
-    assert cli("init").status == 0
+def test_without_a_name_the_folder_is_tissuq_example(done, here):
+    done("init")
     assert [path.name for path in here.iterdir()] == ["tissuq-example"]
 
 
-def test_an_empty_folder_is_written_into(cli, here):
+def test_an_empty_folder_is_written_into(done, here):
     (here / "mine").mkdir()
-    assert cli("init", "mine").status == 0
+    done("init", "mine")
     assert (here / "mine" / "study.toml").exists()
 
 
@@ -58,12 +58,11 @@ def test_a_project_that_cannot_be_finished_leaves_nothing(cli, here, monkeypatch
     assert (here / "brain").exists() == is_there
 
 
-def test_the_commands_of_the_example_work(cli, here, monkeypatch):
+def test_the_commands_of_the_example_work(cli, done, here, monkeypatch):
     cli("init", "brain")
     monkeypatch.chdir(here / "brain")
-    assert cli("inspect", "data/tension-compression.csv").status == 0
-    said = cli("fit", "study.toml", "--discrepancy", "none", "--no-figures")
-    assert said.status == 0, said.err
+    done("inspect", "data/tension-compression.csv")
+    said = done("fit", "study.toml", "--discrepancy", "none", "--no-figures")
     assert "Each test predicted from the others" in said.out
 
 
