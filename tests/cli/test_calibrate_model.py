@@ -215,13 +215,22 @@ def test_files_and_models_that_do_not_fit_end_with_one_message(refused, here, wo
     refused([message], words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, "--noise-sd", "unknown", *more)
 
 
-def test_two_controls_of_one_of_several_files_are_refused(cli, here, words):
+def test_two_controls_of_one_of_several_files_are_refused(refused, here, words):
     two_experiments(here)
     (here / "pull.csv").write_text("travel,turn,pull (N)\n0.2,1,0.001\n0.5,2,0.002\n0.9,3,0.003\n")
     along = ["--along", "travel=U2@TOP", "--along", "turn=U1@TOP"]
-    said = cli(words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, "--noise-sd", "unknown", *TWO, *along)
-    assert said.status == 2
-    assert "has the columns travel and turn, both given as its control (--along)" in " ".join(said.err.split())
+    refused(
+        ["has the columns travel and turn, both given as its control (--along)"],
+        words[0],
+        "punch.csv",
+        "pull.csv",
+        *words[2:],
+        *WIDE,
+        "--noise-sd",
+        "unknown",
+        *TWO,
+        *along,
+    )
     assert started(here) == []
 
 

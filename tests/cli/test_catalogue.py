@@ -49,12 +49,10 @@ def test_a_data_set_is_copied_into_a_new_folder(done, here):
     assert copied.read_bytes() == datasets.path("rubber-treloar-uniaxial").read_bytes()
 
 
-def test_a_copied_data_set_is_overwritten_with_force_alone(cli, done, here):
+def test_a_copied_data_set_is_overwritten_with_force_alone(refused, done, here):
     there = here / "rubber-treloar-uniaxial.csv"
     there.write_text("mine")
-    said = cli("datasets", "--copy", "rubber-treloar-uniaxial")
-    assert said.status == 2
-    assert "--force" in said.err
+    refused(["--force"], "datasets", "--copy", "rubber-treloar-uniaxial")
     assert there.read_text() == "mine"
     done("datasets", "--copy", "rubber-treloar-uniaxial", "--force")
     assert there.read_text() != "mine"
@@ -70,9 +68,7 @@ def test_a_copied_data_set_is_overwritten_with_force_alone(cli, done, here):
         (["--copy", "rubber-treloar-uniaxial", "--to", "a-file"], ["a-file"]),
     ],
 )
-def test_a_copy_that_cannot_be_made_is_refused(cli, here, arguments, words):
+def test_a_copy_that_cannot_be_made_is_refused(refused, here, arguments, words):
     (here / "a-file").write_text("mine")
-    said = cli("datasets", *arguments)
-    assert said.status == 2
-    assert all(word in said.err for word in words)
+    refused(words, "datasets", *arguments)
     assert [path.name for path in here.iterdir()] == ["a-file"]

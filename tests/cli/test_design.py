@@ -90,10 +90,8 @@ def test_what_to_do_next_repeats_the_modes_and_what_the_interval_is_of(cli, done
     assert words in " ".join(said.out.split()), said.err
 
 
-def test_a_stress_that_is_known_is_no_target(cli, run):
-    said = cli("design", "run", *TESTS, "--target", "planar:1")
-    assert said.status == 2
-    assert "target 'planar:1': its value is known already" in said.err
+def test_a_stress_that_is_known_is_no_target(refused, run):
+    refused(["target 'planar:1': its value is known already"], "design", "run", *TESTS, "--target", "planar:1")
 
 
 @pytest.mark.slow

@@ -113,7 +113,7 @@ def test_cards_are_never_overwritten_unasked(cli, here, run):
         assert ("exists" in said.err) == (status == 2)
 
 
-def test_fibres_have_cards_for_the_codes_that_have_them(cli, done, here):
+def test_fibres_have_cards_for_the_codes_that_have_them(refused, done, here):
     rows = [f"{x},{y},{100 * (x - 1):.3f},{90 * (y - 1):.3f}" for x in (1.05, 1.1, 1.2) for y in (1.02, 1.1, 1.15)]
     (here / "sheet.csv").write_text("stretch x,stretch y,stress x (kPa),stress y (kPa)\n" + "\n".join(rows) + "\n")
     done(
@@ -123,9 +123,7 @@ def test_fibres_have_cards_for_the_codes_that_have_them(cli, done, here):
     done("export", "runs/sheet", "--format", "calculix", "--draws", 2)
     (first, _) = sorted((here / "cards" / "sheet-calculix").glob("*.inp"))
     assert "*MATERIAL, NAME=ELASTIC_FIBER_TISSUE\n*USER MATERIAL, CONSTANTS=6\n" in first.read_text()
-    said = cli("export", "runs/sheet", "--format", "ls-dyna")
-    assert said.status == 2
-    assert "abaqus or calculix or febio" in said.err
+    refused(["abaqus or calculix or febio"], "export", "runs/sheet", "--format", "ls-dyna")
 
 
 def test_the_help_names_every_format(cli):

@@ -138,8 +138,6 @@ def test_a_prediction_is_never_overwritten_unasked(cli, here, run):
         assert ("run-uniaxial" in said.err) == (status == 2)
 
 
-def test_a_prediction_is_no_run_to_predict_from(cli, done, here, run):
+def test_a_prediction_is_no_run_to_predict_from(refused, done, here, run):
     done("predict", run, "--discrepancy", "none", "--no-figures", "--points", 3)
-    said = cli("predict", "run-uniaxial")
-    assert said.status == 2
-    assert "run of tissuq fit" in said.err
+    refused(["run of tissuq fit"], "predict", "run-uniaxial")

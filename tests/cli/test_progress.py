@@ -183,7 +183,7 @@ def test_what_is_said_when_stopped_names_what_is_done_and_how_to_go_on(folder, m
     assert monitor.stopped() == wanted + "tissuq structure 'my run'"
 
 
-def test_quiet_prints_the_answer_of_a_ranking_alone(cli, done, here, specimen):
+def test_quiet_prints_the_answer_of_a_ranking_alone(cli, refused, done, here, specimen):
     done("fit", specimen, *ALONE, "--out", "run")
     options = ("--candidate", "planar 1.05:1.2 6", "--no-figures")
     said = cli("design", "run", *options, "--quiet")
@@ -193,9 +193,7 @@ def test_quiet_prints_the_answer_of_a_ranking_alone(cli, done, here, specimen):
     name, _, value = line.partition(": ")
     assert name in loud
     assert value in " ".join(loud.split())
-    wrong = cli("design", "nowhere", "--quiet")
-    assert wrong.status == 2
-    assert "no run folder" in wrong.err
+    refused(["no run folder"], "design", "nowhere", "--quiet")
 
 
 def test_quiet_prints_the_numbers_of_a_fit_alone(cli, here, specimen):

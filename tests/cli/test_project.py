@@ -31,19 +31,16 @@ def test_an_empty_folder_is_written_into(done, here):
 
 
 @pytest.mark.parametrize("place", ["folder", "file"])
-def test_what_is_there_is_left_alone(cli, here, place):
+def test_what_is_there_is_left_alone(refused, here, place):
     (here / "folder").mkdir()
     (here / "folder" / "mine.txt").write_text("mine")
     (here / "file").write_text("mine")
-    said = cli("init", place)
-    assert said.status == 2
-    assert f"'{place}'" in said.err
-    assert "tissuq init FOLDER" in said.err
+    refused([f"'{place}'", "tissuq init FOLDER"], "init", place)
     assert [path.name for path in (here / "folder").iterdir()] == ["mine.txt"]
 
 
 @pytest.mark.parametrize("is_there", [True, False])
-def test_a_project_that_cannot_be_finished_leaves_nothing(cli, here, monkeypatch, is_there):
+def test_a_project_that_cannot_be_finished_leaves_nothing(refused, here, monkeypatch, is_there):
     if is_there:
         (here / "brain").mkdir()
 
@@ -51,9 +48,7 @@ def test_a_project_that_cannot_be_finished_leaves_nothing(cli, here, monkeypatch
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", full)
-    said = cli("init", "brain")
-    assert said.status == 2
-    assert "No space left" in said.err
+    refused(["No space left"], "init", "brain")
     assert [path for path in here.rglob("*") if path != here / "brain"] == []
     assert (here / "brain").exists() == is_there
 

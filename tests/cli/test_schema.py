@@ -44,7 +44,5 @@ def test_a_file_may_hold_more_than_the_command_line_says():
     assert schema_of("coverage")["required"] == ["designs"]
 
 
-def test_a_command_without_settings_has_no_schema(cli):
-    said = cli("schema", "modes")
-    assert said.status == 2
-    assert "'modes'" in said.err
+def test_a_command_without_settings_has_no_schema(refused):
+    refused(["'modes'"], "schema", "modes")
