@@ -124,11 +124,8 @@ def _predicting(study: CalibrationStudy) -> tuple[Verdict, str]:
 def _half_width(calibration: Calibration, *, discrepancy: bool) -> float:
     """Return the half width of the band over its middle where it was measured, of the quantity with the widest one."""
     table = calibration.predict(noise=False, discrepancy=discrepancy)
-    control, *ends = (table[name].to_numpy() for name in ("control", "mean", "low", "high"))
-    return max(
-        relative_half_width(Band(control[start:stop], *(end[start:stop] for end in ends)))
-        for start, stop in calibration.problem.quantities.values()
-    )
+    band = Band(*(table[name].to_numpy() for name in ("control", "mean", "low", "high")))
+    return max(relative_half_width(band.at(slice(*ends))) for ends in calibration.problem.quantities.values())
 
 
 def _of_model_alone(use: Use, study: CalibrationStudy) -> Use:
