@@ -155,7 +155,7 @@ class Call(Generic[Kind, How]):
         if source and self.config:
             raise InputError(
                 f"'{self.config}' is of a {earlier}, and names what that is of: leave out --config, or {what} "
-                f"({_shown(source)})."
+                f"({' '.join(map(str, source if isinstance(source, list) else [source]))})."
             )
         if not (source or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
@@ -258,11 +258,6 @@ class Call(Generic[Kind, How]):
         for number in record["numbers"] if self.monitor.is_quiet else ():
             remark = f", {number['remark']}" if number["remark"] else ""
             print(f"{number['name'].removesuffix(':')}: {number['text']}{remark}", file=self.out)
-
-
-def _shown(files: Any) -> str:
-    """Return a file, or several, as they were typed."""
-    return " ".join(map(str, files)) if isinstance(files, list | tuple) else str(files)
 
 
 def not_converged(names: list[str]) -> None:
