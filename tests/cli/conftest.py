@@ -73,6 +73,18 @@ def cli(here, monkeypatch, capsys) -> Cli:
 
 
 @pytest.fixture
+def done(cli) -> Cli:
+    """Run a command that ends well."""
+
+    def run(*arguments: object) -> Outcome:
+        said = cli(*arguments)
+        assert said.status == 0, said.err
+        return said
+
+    return run
+
+
+@pytest.fixture
 def refused(cli, here) -> Callable[..., Outcome]:
     """Run a command that says in one message, with these words, what is wrong, and leaves the folder as it was."""
 
@@ -123,12 +135,17 @@ def run_in(folder: Path, *arguments: object) -> Outcome:
     return Outcome(int(end.value.code or 0), out.getvalue(), err.getvalue())
 
 
+def done_in(folder: Path, *arguments: object) -> Outcome:
+    """Run a command that ends well in this process, in a folder."""
+    said = run_in(folder, *arguments)
+    assert said.status == 0, said.err
+    return said
+
+
 def fitted_in(folder: Path, *options: object) -> Outcome:
     """Fit a file of six measurements in a folder, with their noise."""
     write_specimen(folder / "specimen.csv")
-    said = run_in(folder, "fit", "specimen.csv", "--noise-sd", 1, *options)
-    assert said.status == 0, said.err
-    return said
+    return done_in(folder, "fit", "specimen.csv", "--noise-sd", 1, *options)
 
 
 def tree(folder: Path) -> dict[str, bytes | None]:
@@ -156,9 +173,7 @@ def rows_in_mpa(file: Path) -> list[dict[str, str]]:
 
 def carry_out_paper(folder: Path) -> tuple[Path, Outcome]:
     options = ["--points", 12, "--noise-sd", 0.4, "--seed", 7, "--prior", "c=uniform(0,2)"]
-    said = run_in(folder, "paper", *options, "--out", "run")
-    assert said.status == 0, said.err
-    return folder / "run", said
+    return folder / "run", done_in(folder, "paper", *options, "--out", "run")
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 
 import tissuq as tq
 
-from .conftest import rows_of, run_in, write_specimen
+from .conftest import done_in, rows_of, write_specimen
 from .models import killed_after, started, write_model
 
 TIMES = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0])
@@ -46,25 +46,22 @@ def c10(folder: Path) -> tuple[float, float]:
 
 
 @pytest.mark.slow
-def test_where_no_parameters_fit_units_and_priors_come_before_anything_else(cli, here, words):
+def test_where_no_parameters_fit_units_and_priors_come_before_anything_else(done, here, words):
     forces(here)
-    said = cli(*words, "--prior", "C10=uniform(0.01,0.02)")
-    assert said.status == 0, said.err
+    said = done(*words, "--prior", "C10=uniform(0.01,0.02)")
     assert "Next: check units and signs of data and model (--unit, --factor), and the priors" in said.out
     assert "Not to be used: no parameters that the priors allow give the measurements" in " ".join(said.out.split())
 
 
 @pytest.mark.slow
-def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, here, words):
+def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, done, here, words):
     mean, sd = forces(here)
-    said = cli(*words, *WIDE)
-    assert said.status == 0, said.err
+    done(*words, *WIDE)
     found = c10(here / "out")
     assert found[0] == pytest.approx(mean, abs=0.05 * sd)
     assert found[1] == pytest.approx(sd, rel=0.03)
     assert len(started(here)) == 8
-    said = cli("export", "out", "--format", "calculix", "--draws", 64, "--unit", "kPa", "--out", "cards")
-    assert said.status == 0, said.err
+    done("export", "out", "--format", "calculix", "--draws", 64, "--unit", "kPa", "--out", "cards")
     constants = [float(row["card_C10"]) for row in rows_of(here / "cards" / "index.csv")]
     assert np.mean(constants) == pytest.approx(mean, abs=0.2 * sd)
     said = cli("design", "out")
@@ -81,18 +78,18 @@ def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, he
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("heading", "factor"), [("force (N)", 1e-3), ("force (uN)", 1e3)])
-def test_units_signs_and_symmetry_are_made_those_of_the_file(cli, here, words, heading, factor):
+def test_units_signs_and_symmetry_are_made_those_of_the_file(done, here, words, heading, factor):
     mean, sd = forces(here)
     table = np.loadtxt(here / "punch.csv", delimiter=",", skiprows=1)
     rows = "".join(f"{at:.3f},{-4 * factor * force:.9g}\n" for at, force in table)
     (here / "punch.csv").write_text(f"time,{heading}\n{rows}")
     changed = [4 * factor * NOISE_SD if word == NOISE_SD else word for word in words]
-    assert cli(*changed, *WIDE, "--factor", "force=-4").status == 0
+    done(*changed, *WIDE, "--factor", "force=-4")
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
 
 
 @pytest.mark.slow
-def test_several_quantities_of_a_deck_have_a_column_a_unit_and_a_noise_each(cli, here, words):
+def test_several_quantities_of_a_deck_have_a_column_a_unit_and_a_noise_each(done, here, words):
     """Least squares with weights; a quantity counts where there is a value of it."""
     forces(here)
     table = np.loadtxt(here / "punch.csv", delimiter=",", skiprows=1)
@@ -107,15 +104,13 @@ def test_several_quantities_of_a_deck_have_a_column_a_unit_and_a_noise_each(cli,
     noise = f"force={NOISE_SD},reaction={1e-3 * second_sd}"
     changed = [noise if word == NOISE_SD else word for word in words]
     more = ["--qoi", "reaction=RF2@TOP", "--factor", "reaction=-1"]
-    said = cli(*changed, *WIDE, *more)
-    assert said.status == 0, said.err
+    done(*changed, *WIDE, *more)
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
     assert [row["quantity"] for row in rows_of(here / "out" / "prediction.csv")] == ["force"] * 7 + ["reaction"] * 4
     page = " ".join((here / "out" / "report.html").read_text(encoding="utf-8").split())
     assert "reaction (N) of the file is -0.001 times reaction (RF2@TOP)" in page
     repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--figures", "--out", "again"]
-    said = cli(*repeat, "--command", words[words.index("--command") + 1])
-    assert said.status == 0, said.err
+    done(*repeat, "--command", words[words.index("--command") + 1])
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 
@@ -137,13 +132,12 @@ TWO = ["--model", "pull.inp", "--replace", "OTHER", "--qoi", "pull=RF2@TOP"]
 
 
 @pytest.mark.slow
-def test_experiments_have_a_file_and_a_model_each(cli, here, words):
+def test_experiments_have_a_file_and_a_model_each(done, here, words):
     """Least squares with weights; the file named first is that of the model named first."""
     mean, sd = two_experiments(here)
     noises = f"force={NOISE_SD},pull={5e-5}"
     words = [words[0], "punch.csv", "pull.csv", *(noises if word == NOISE_SD else word for word in words[2:])]
-    said = cli(*words, *WIDE, *TWO)
-    assert said.status == 0, said.err
+    done(*words, *WIDE, *TWO)
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
     assert len(started(here)) == 2 * 8
     assert [row["quantity"] for row in rows_of(here / "out" / "prediction.csv")] == ["force"] * 7 + ["pull"] * 3
@@ -151,13 +145,12 @@ def test_experiments_have_a_file_and_a_model_each(cli, here, words):
     assert "of pull.inp got the card of neo-hookean" in page
     assert "pull (N) of the file is 0.001 times pull (RF2@TOP)" in page
     repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--out", "again"]
-    said = cli(*repeat, "--command", words[words.index("--command") + 1])
-    assert said.status == 0, said.err
+    done(*repeat, "--command", words[words.index("--command") + 1])
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 
 @pytest.mark.slow
-def test_files_that_several_models_need_are_copied_for_each_and_the_run_is_repeated(cli, here, words):
+def test_files_that_several_models_need_are_copied_for_each_and_the_run_is_repeated(done, here, words):
     """Of two decks one includes a mesh beside its folder; both get a file that none includes."""
     mean, sd = two_experiments(here)
     deck = (here / "model.inp").read_text()
@@ -168,12 +161,10 @@ def test_files_that_several_models_need_are_copied_for_each_and_the_run_is_repea
     (here / "fibres.txt").write_text("none")
     changed = {"model.inp": "punch/model.inp", NOISE_SD: f"force={NOISE_SD},pull={5e-5}"}
     words = [words[0], "punch.csv", "pull.csv", *(changed.get(word, word) for word in words[2:])]
-    said = cli(*words, *WIDE, *TWO, "--also", "mesh.inp", "--also", "fibres.txt")
-    assert said.status == 0, said.err
+    done(*words, *WIDE, *TWO, "--also", "mesh.inp", "--also", "fibres.txt")
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
     repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--no-figures", "--out", "again"]
-    said = cli(*repeat, "--command", words[words.index("--command") + 1])
-    assert said.status == 0, said.err
+    done(*repeat, "--command", words[words.index("--command") + 1])
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
     for number in (1, 2):
         copies = {path.name for path in (here / "again" / "input" / f"{number}").rglob("*")}
@@ -194,15 +185,14 @@ def test_a_range_that_is_none_is_refused_before_anything_is_run(cli, here, words
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
-def test_what_is_killed_in_a_second_model_keeps_the_run_of_the_first(cli, here, words):
+def test_what_is_killed_in_a_second_model_keeps_the_run_of_the_first(done, here, words):
     """Only the run of the solver that was going on is made again: 17 of two models at 8 points."""
     two_experiments(here)
     words = [words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, *TWO, "--noise-sd", f"force={NOISE_SD},pull={5e-5}"]
     (here / "slow").write_text("1")
     killed_after(6, here / "started", here, *words)
     (here / "slow").unlink()
-    said = cli(*words)
-    assert said.status == 0, said.err
+    done(*words)
     assert len(started(here)) == 2 * 8 + 1
     assert not list((here / "out-forward-runs").glob("model-*/solver/*"))
 
@@ -225,22 +215,30 @@ def test_files_and_models_that_do_not_fit_end_with_one_message(refused, here, wo
     refused([message], words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, "--noise-sd", "unknown", *more)
 
 
-def test_two_controls_of_one_of_several_files_are_refused(cli, here, words):
+def test_two_controls_of_one_of_several_files_are_refused(refused, here, words):
     two_experiments(here)
     (here / "pull.csv").write_text("travel,turn,pull (N)\n0.2,1,0.001\n0.5,2,0.002\n0.9,3,0.003\n")
     along = ["--along", "travel=U2@TOP", "--along", "turn=U1@TOP"]
-    said = cli(words[0], "punch.csv", "pull.csv", *words[2:], *WIDE, "--noise-sd", "unknown", *TWO, *along)
-    assert said.status == 2
-    assert "has the columns travel and turn, both given as its control (--along)" in " ".join(said.err.split())
+    refused(
+        ["has the columns travel and turn, both given as its control (--along)"],
+        words[0],
+        "punch.csv",
+        "pull.csv",
+        *words[2:],
+        *WIDE,
+        "--noise-sd",
+        "unknown",
+        *TWO,
+        *along,
+    )
     assert started(here) == []
 
 
 @pytest.mark.slow
-def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
+def test_runs_that_fail_are_listed_and_left_out(done, here, words):
     mean, sd = forces(here)
     (here / "stiff").write_text("6.83")  # above which are 4 of 12 stratified runs: as many are left as in other tests
-    said = cli(*words, *WIDE, "--runs", 12)
-    assert said.status == 0, said.err
+    said = done(*words, *WIDE, "--runs", 12)
     runs = rows_of(here / "out" / "forward_runs.csv")
     assert all(bool(run["error"]) == (float(run["C10"]) > 6.83) for run in runs)
     assert sum(bool(run["error"]) for run in runs) == 4
@@ -252,33 +250,30 @@ def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
 
 
 @pytest.mark.slow
-def test_runs_that_failed_are_made_again_by_the_same_command(cli, here, words):
+def test_runs_that_failed_are_made_again_by_the_same_command(done, here, words):
     forces(here)
     (here / "sometimes").touch()  # one run of the solver gets no licence
     for options, failed, starts in (([], 1, 8), (["--force"], 0, 9)):
-        said = cli(*words, *WIDE, *options)
-        assert said.status == 0, said.err
+        done(*words, *WIDE, *options)
         assert sum(bool(run["error"]) for run in rows_of(here / "out" / "forward_runs.csv")) == failed
         assert len(started(here)) == starts
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
-def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, words):
+def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(done, here, words):
     forces(here)
     (here / "slow").write_text("0.3")
     results = here / "out-forward-runs" / "batch-0" / "tasks.jsonl"
-    done = killed_after(3, results, here, *words, *WIDE)
+    kept = killed_after(3, results, here, *words, *WIDE)
     (here / "slow").unlink()
     before = len(started(here))
-    said = cli(*words, *WIDE)
-    assert said.status == 0, said.err
-    assert results.read_text(encoding="utf-8").splitlines()[:3] == done
+    done(*words, *WIDE)
+    assert results.read_text(encoding="utf-8").splitlines()[:3] == kept
     assert 3 <= before <= 4 + 1
     assert len(started(here)) - before <= 8 - 3
     assert not list((here / "out-forward-runs" / "solver").glob(".running-*"))
-    again = cli(*words[:-2], *WIDE, "--runs-in", "out-forward-runs", "--out", "whole")
-    assert again.status == 0, again.err
+    done(*words[:-2], *WIDE, "--runs-in", "out-forward-runs", "--out", "whole")
     assert (here / "whole" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
     assert len(started(here)) - before <= 8 - 3
 
@@ -288,7 +283,7 @@ def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
     """Normal prior and likelihood: precisions add up. The log-normal prior, 1 % wide, is nearly normal."""
     write_specimen(tmp_path / "specimen.csv")
     options = ["--noise-sd", 1, "--discrepancy", "none", "--tolerance", "none", "--no-figures", "--out", "fitted"]
-    assert run_in(tmp_path, "fit", "specimen.csv", *options).status == 0
+    done_in(tmp_path, "fit", "specimen.csv", *options)
     before = tq.load(tmp_path / "fitted").marginals["C10"]  # MPa
     centre = 1e3 * before.mean
     measured = centre * 1.01 * TIMES
@@ -296,13 +291,12 @@ def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
         "time,force (mN)\n" + "".join(f"{at},{force:.6f}\n" for at, force in zip(TIMES, measured, strict=True))
     )
     noise_sd = 1e3 * before.sd * np.sqrt(TIMES @ TIMES)  # as informative as the prior
-    said = run_in(
+    done_in(
         tmp_path, "calibrate", "punch.csv", "--model", "model.inp", "--replace", "TISSUE", "--material", "neo-hookean",
         "--range", "0.7:1.3", "--qoi", "force=RF2@TOP", "--command", write_model(tmp_path), "--solver", "ccx",
         "--unit", "kPa", "--prior-run", "fitted", "--noise-sd", noise_sd, "--discrepancy", "none", "--runs", 8,
         "--max-jobs", 1, "--no-figures", "--out", "out",
     )  # fmt: skip
-    assert said.status == 0, said.err
     mean, sd = c10(tmp_path / "out")
     assert sd == pytest.approx(1e3 * before.sd / np.sqrt(2), rel=0.05)
     assert mean == pytest.approx(1.005 * centre, abs=0.1 * sd)
@@ -310,16 +304,15 @@ def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_is_repeated_from_its_own_folder_when_its_command_is_named(cli, here, words):
+def test_a_run_is_repeated_from_its_own_folder_when_its_command_is_named(cli, done, here, words):
     forces(here)
-    assert cli(*words, *WIDE).status == 0
+    done(*words, *WIDE)
     repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--no-figures", "--out", "again"]
     said = cli(*repeat)
     assert said.status == 2
     assert "--command" in said.err
     assert len(started(here)) == 8
-    said = cli(*repeat, "--command", words[words.index("--command") + 1])
-    assert said.status == 0, said.err
+    done(*repeat, "--command", words[words.index("--command") + 1])
     assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 

@@ -35,9 +35,8 @@ def fits_in(folder):
 
 
 @pytest.mark.slow
-def test_runs_are_compared(cli, two_runs):
-    said = cli("compare", "first", "second", "--out", "compared")
-    assert said.status == 0, said.err
+def test_runs_are_compared(cli, done, two_runs):
+    said = done("compare", "first", "second", "--out", "compared")
     for name in ("first/none", "first/constant", "second/auto"):
         assert name in said.out
     assert "C10, kPa (95 %)" in said.out
@@ -78,17 +77,13 @@ def test_what_is_no_run_is_refused(refused, arguments, words):
     refused([words], "compare", *arguments)
 
 
-def test_a_run_is_compared_once(cli, here):
-    said = cli("compare", "run", "./run")
-    assert said.status == 2
-    assert "a run is given twice among run, run: name every run once" in said.err
+def test_a_run_is_compared_once(refused, here):
+    refused(["a run is given twice among run, run: name every run once"], "compare", "run", "./run")
 
 
-def test_a_file_that_is_no_posterior_is_named_and_refused(cli, here):
+def test_a_file_that_is_no_posterior_is_named_and_refused(refused, here):
     (here / "broken.nc").write_text("nothing")
-    said = cli("compare", "broken.nc")
-    assert said.status == 2
-    assert "'broken.nc' is damaged or no posterior of tissuq" in " ".join(said.err.split())
+    refused(["'broken.nc' is damaged or no posterior of tissuq"], "compare", "broken.nc")
 
 
 @pytest.mark.parametrize("command", ["compare", "design", "export"])
@@ -102,19 +97,19 @@ def test_measurements_in_place_of_a_run_are_named_as_such(cli, here, command):
 
 
 @pytest.mark.slow
-def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
+def test_runs_of_one_name_are_kept_apart(done, two_runs, empty_figures):
     (two_runs / "other").mkdir()
     (two_runs / "first").rename(two_runs / "other" / "run")
     (two_runs / "second").rename(two_runs / "run")
-    assert cli("compare", "other/run", "run", "--out", "one").status == 0
+    done("compare", "other/run", "run", "--out", "one")
     assert len(fits_in(two_runs / "one")) == 3
-    assert cli("compare", "other/run/posterior/none.nc", "other/run", "--out", "two").status == 0
+    done("compare", "other/run/posterior/none.nc", "other/run", "--out", "two")
     assert len(fits_in(two_runs / "two")) == 3
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("text", slow_but(["nothing"], ["nothing", "[]", '[{"formulation": "auto"}]']))
-def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, empty_figures, text):
+def test_a_damaged_assessment_leaves_other_priors_unknown(done, two_runs, empty_figures, text):
     (two_runs / "second" / "assessment.json").write_text(text)
-    assert cli("compare", "first/posterior/none.nc", "second", "--out", "compared").status == 0
+    done("compare", "first/posterior/none.nc", "second", "--out", "compared")
     assert fits_in(two_runs / "compared")["second/auto"]["evidence_change_quarter"] == ""

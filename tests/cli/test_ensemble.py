@@ -19,12 +19,11 @@ from .models import DECK, started
 
 
 @pytest.mark.slow
-def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
-    said = cli("ensemble", *model, "--unit", "kPa")
-    assert said.status == 0, said.err
+def test_the_forces_are_those_of_the_draws_that_export_writes(done, here, model):
+    said = done("ensemble", *model, "--unit", "kPa")
     assert "Model 'model.inp' with 6 draws" in said.out
     assert str(Path("out") / "report.html") in said.out
-    assert cli("export", "run", "--format", "calculix", "--draws", 6, "--unit", "kPa", "--out", "cards").status == 0
+    done("export", "run", "--format", "calculix", "--draws", 6, "--unit", "kPa", "--out", "cards")
     constants = [float(row["card_C10"]) for row in rows_of(here / "cards" / "index.csv")]
     assert len(set(constants)) == 6
     draws = rows_of(here / "out" / "draws.csv")
@@ -42,15 +41,14 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert "HYPERELASTIC, NEO HOOKE" in page
 
 
-def test_what_the_fit_says_against_finite_elements_is_said_of_the_band(cli, here, model):
+def test_what_the_fit_says_against_finite_elements_is_said_of_the_band(cli, done, here, model):
     result = here / "run" / "result.json"
     record = json.loads(result.read_text(encoding="utf-8"))
     record["uses"][-1] |= {"verdict": "no", "reason": "it tore"}
     record["next"] = "see which test would make it narrower: tissuq design {run}"
     record["warnings"].append({"code": "measurements", "severity": "caution", "text": "it tore: give --until-peak."})
     result.write_text(json.dumps(record), encoding="utf-8")
-    said = cli("ensemble", *model, "--no-figures")
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures")
     of_band = json.loads((here / "out" / "result.json").read_text(encoding="utf-8"))
     assert of_band["uses"] == [{"purpose": "use of the fit in finite elements", "verdict": "no", "reason": "it tore"}]
     next_step = "see which test would make it narrower: tissuq design run"
@@ -69,12 +67,11 @@ def test_what_the_fit_says_against_finite_elements_is_said_of_the_band(cli, here
 
 
 @pytest.mark.slow
-def test_the_next_test_is_for_a_quantity_of_the_model(cli, here, model):
+def test_the_next_test_is_for_a_quantity_of_the_model(done, here, model):
     """The stub's force is C10: what a test tells of the one it tells of the other."""
     model[model.index("--draws") + 1] = 16
-    assert cli("ensemble", *model, "--no-figures").status == 0
-    said = cli("design", "run", "--target", "ensemble:out", "--target", "C10", "--out", "ranking", "--no-figures")
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures")
+    said = done("design", "run", "--target", "ensemble:out", "--target", "C10", "--out", "ranking", "--no-figures")
     assert "Force of the model model.inp" in said.out
     rows = rows_of(here / "ranking" / "design.csv")
     gains = {
@@ -83,7 +80,7 @@ def test_the_next_test_is_for_a_quantity_of_the_model(cli, here, model):
     }
     assert len(gains["C10"]) > 3
     np.testing.assert_allclose(gains["ensemble:out:force"], gains["C10"], rtol=1e-5)
-    assert cli("design", "--config", "ranking/run.toml", "--out", "again", "--no-figures").status == 0
+    done("design", "--config", "ranking/run.toml", "--out", "again", "--no-figures")
     assert (here / "again" / "design.csv").read_bytes() == (here / "ranking" / "design.csv").read_bytes()
 
 
@@ -91,25 +88,25 @@ def test_the_next_test_is_for_a_quantity_of_the_model(cli, here, model):
     ("target", "words"),
     [("ensemble:nowhere", "no complete ensemble in"), ("ensemble:out:moment", "ensemble:.*out:force")],
 )
-def test_a_quantity_that_no_ensemble_has_is_refused(cli, here, model, target, words):
-    assert cli("ensemble", *model, "--no-figures").status == 0
+def test_a_quantity_that_no_ensemble_has_is_refused(cli, done, here, model, target, words):
+    done("ensemble", *model, "--no-figures")
     said = cli("design", "run", "--target", target)
     assert said.status == 2
     assert re.search(words, said.err)
 
 
 @pytest.mark.slow
-def test_an_ensemble_of_another_run_is_refused(cli, here, model):
-    assert cli("ensemble", *model, "--no-figures").status == 0
+def test_an_ensemble_of_another_run_is_refused(cli, done, here, model):
+    done("ensemble", *model, "--no-figures")
     fit = "fit", write_specimen(here / "other.csv"), "--material", "yeoh", "--discrepancy", "none", "--no-figures"
-    assert cli(*fit, "--out", "another").status == 0
+    done(*fit, "--out", "another")
     said = cli("design", "another", "--target", "ensemble:out")
     assert said.status == 2
     assert "none of the materials of the ensemble (TISSUE) is of this run" in said.err
 
 
-def test_the_decks_differ_from_the_model_in_the_material_alone(cli, here, model):
-    assert cli("ensemble", *model, "--no-figures").status == 0
+def test_the_decks_differ_from_the_model_in_the_material_alone(done, here, model):
+    done("ensemble", *model, "--no-figures")
     start, end = DECK.index("*ELASTIC"), DECK.index("*MATERIAL, NAME=Fat")
     for number in range(1, 7):
         text = (here / "out" / "draws" / f"complete-{number}" / "model.inp").read_text(encoding="utf-8")
@@ -140,7 +137,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("code", OTHERS)
-def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli, here, model, code):
+def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(done, here, model, code):
     name, deck, wanted, pattern, column = OTHERS[code]
     (here / name).write_text(deck, encoding="utf-8")
     body = (
@@ -151,22 +148,20 @@ def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli,
     command = f'"{Path(sys.executable).as_posix()}" -c "print(\'{says}\')"'
     solver = ["--solver", "febio4"] if code == "febio" else []
     options = ["--qoi", "first=mine.py:first", *solver, "--command", command, "--draws", 3, "--max-jobs", 1]
-    said = cli("ensemble", "run", name, "--replace", wanted, *options, "--no-figures", "--out", "out")
-    assert said.status == 0, said.err
-    assert cli("export", "run", "--format", code, "--draws", 3, "--out", "cards").status == 0
+    done("ensemble", "run", name, "--replace", wanted, *options, "--no-figures", "--out", "out")
+    done("export", "run", "--format", code, "--draws", 3, "--out", "cards")
     constants = [float(row[column]) for row in rows_of(here / "cards" / "index.csv")]
     assert [float(row["first"]) for row in rows_of(here / "out" / "draws.csv")] == pytest.approx(constants, rel=1e-9)
 
 
-def test_every_material_may_name_its_run(cli, here, model):
+def test_every_material_may_name_its_run(done, here, model):
     words = ["model.inp", "--replace", "TISSUE=run", *model[4:]]
-    assert cli("ensemble", *words, "--no-figures").status == 0
+    done("ensemble", *words, "--no-figures")
     assert len(rows_of(here / "out" / "draws.csv")) == 6
 
 
-def test_a_dry_run_shows_the_diff_and_leaves_nothing(cli, here, model):
-    said = cli("ensemble", *model, "--dry-run")
-    assert said.status == 0, said.err
+def test_a_dry_run_shows_the_diff_and_leaves_nothing(done, here, model):
+    said = done("ensemble", *model, "--dry-run")
     lines = said.out.splitlines()
     gone = [line for line in lines if line.startswith("-") and not line.startswith(("---", "- "))]
     assert gone == ["-*ELASTIC", "-1., 0.3"]
@@ -175,13 +170,9 @@ def test_a_dry_run_shows_the_diff_and_leaves_nothing(cli, here, model):
     assert not started(here)
 
 
-def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, model):
-    assert (
-        cli("fit", write_specimen(here / "other.csv"), "--noise-sd", 2, "--discrepancy", "none", "--no-figures").status
-        == 0
-    )
-    said = cli("ensemble", *model, "--replace", "fat=runs/other", "--no-figures")
-    assert said.status == 0, said.err
+def test_two_materials_get_draws_of_their_runs_that_are_independent(done, here, model):
+    done("fit", write_specimen(here / "other.csv"), "--noise-sd", 2, "--discrepancy", "none", "--no-figures")
+    done("ensemble", *model, "--replace", "fat=runs/other", "--no-figures")
     rows = rows_of(here / "out" / "draws.csv")
     pairs = np.array([[float(row["TISSUE.C10 [MPa]"]), float(row["fat.C10 [MPa]"])] for row in rows])
     assert abs(np.corrcoef(pairs.T)[0, 1]) < 0.95  # one sequence for both would order them alike
@@ -189,14 +180,13 @@ def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, m
     assert text.count("*HYPERELASTIC") == 2
 
 
-def test_a_function_is_named_as_typed_and_a_dry_run_of_a_recipe_does_not_run_it(cli, here, model):
+def test_a_function_is_named_as_typed_and_a_dry_run_of_a_recipe_does_not_run_it(done, here, model):
     (here / "mine.py").write_text("def size(folder):\n    return 1\n")
-    assert cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size").status == 0
+    done("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size")
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "<p>mine.py:size, in the units of the model" in page  # as typed
     copy = here / "out" / "quantities" / "mine.py"
     copy.write_text(f"open({str(here / 'ran')!r}, 'w')\n" + copy.read_text())
-    said = cli("ensemble", "--config", "out/run.toml", "--dry-run")
-    assert said.status == 0, said.err
+    said = done("ensemble", "--config", "out/run.toml", "--dry-run")
     assert "+*HYPERELASTIC" in said.out
     assert not (here / "ran").exists()

@@ -24,7 +24,7 @@ DECK = "\n".join(
 
 
 @pytest.fixture
-def sheet(cli, here):
+def sheet(done, here):
     """Return the function that fits fibres to a sheet, into runs/sheet."""
     rows = [
         f"{x},{y},{150 * (x - 1) + 900 * (x - 1) ** 2:.3f},{90 * (y - 1) + 200 * (y - 1) ** 2:.3f}"
@@ -36,21 +36,19 @@ def sheet(cli, here):
     def fit(material, discrepancy="none"):
         words = ["--mode", "biaxial", "--material", material, "--noise-sd", 5, "--no-figures"]
         words += ["--discrepancy", discrepancy]
-        fitted = cli("fit", "sheet.csv", *words)
-        assert fitted.status == 0, fitted.err
+        done("fit", "sheet.csv", *words)
 
     return fit
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
-def test_calculix_pulls_a_cube_of_fibres_along_the_axes_of_the_deck(cli, here, sheet):
+def test_calculix_pulls_a_cube_of_fibres_along_the_axes_of_the_deck(done, here, sheet):
     sheet(MATERIAL)
     (here / "cube.inp").write_text(DECK)
     words = ["--qoi", "force=RF1@TIP", "--draws", 2, "--max-jobs", 1, "--no-figures", "--out", "out"]
-    said = cli("ensemble", "runs/sheet", "cube.inp", "--replace", "ELASTIC_FIBER_WALL", *words)
-    assert said.status == 0, said.err
-    assert cli("export", "runs/sheet", "--format", "calculix", "--draws", 2, "--out", "cards").status == 0
+    done("ensemble", "runs/sheet", "cube.inp", "--replace", "ELASTIC_FIBER_WALL", *words)
+    done("export", "runs/sheet", "--format", "calculix", "--draws", 2, "--out", "cards")
     forces = [float(row["force"]) for row in rows_of(here / "out" / "draws.csv")]
     for force, card in zip(forces, sorted((here / "cards").glob("*.inp")), strict=True):
         turned = card.read_text() + "*ORIENTATION, NAME=TURNED\n0., 1., 0., -1., 0., 0.\n"
@@ -69,18 +67,17 @@ def test_a_deck_must_name_its_material_as_calculix_asks(cli, here, sheet):
     assert "rename 'Wall' to 'ELASTIC_FIBER_Wall'" in " ".join(said.err.split())
 
 
-def test_a_draw_of_fibres_is_chosen_for_a_finer_model(cli, here, sheet):
+def test_a_draw_of_fibres_is_chosen_for_a_finer_model(done, here, sheet):
     sheet(MATERIAL)
     (here / "cube.inp").write_text(DECK)
     (here / "fine.inp").write_text(f"** of smaller elements\n{DECK}")
     words = ["--qoi", "force=RF1@TIP", "--draws", 4, "--finer-model", "fine.inp", "--cell-ratio", 2, "--dry-run"]
-    said = cli("ensemble", "runs/sheet", "cube.inp", "--replace", "ELASTIC_FIBER_WALL", *words)
-    assert said.status == 0, said.err
+    done("ensemble", "runs/sheet", "cube.inp", "--replace", "ELASTIC_FIBER_WALL", *words)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["none", "auto"])
-def test_axes_of_a_material_of_febio_stay(cli, here, sheet, discrepancy):
+def test_axes_of_a_material_of_febio_stay(done, here, sheet, discrepancy):
     sheet("neo-hookean+exponential-fibres@30", discrepancy)
     axes = '<mat_axis type="vector"><a>0,1,0</a><d>1,0,0</d></mat_axis>'
     deck = (
@@ -91,8 +88,7 @@ def test_axes_of_a_material_of_febio_stay(cli, here, sheet, discrepancy):
     (here / "wall.feb").write_text(deck)
     (here / "mine.py").write_text("def first(folder):\n    return 1.0\n")
     words = ["--qoi", "first=mine.py:first", "--solver", "febio4", "--dry-run", "--draws", 2, "--all-draws"]
-    said = cli("ensemble", "runs/sheet", "wall.feb", "--replace", "Wall", *words)
-    assert said.status == 0, said.err
+    said = done("ensemble", "runs/sheet", "wall.feb", "--replace", "Wall", *words)
     assert ('+      <solid type="Holzapfel-Gasser-Ogden">' in said.out) == (discrepancy == "auto")
     assert "<gamma>3.0000000000e+01</gamma>" in said.out
     assert f"-{axes}" not in said.out

@@ -34,10 +34,9 @@ def meshed(model, here):
     return model
 
 
-def test_the_band_is_that_for_elements_without_size_and_the_mesh_has_a_share(cli, here, meshed):
+def test_the_band_is_that_for_elements_without_size_and_the_mesh_has_a_share(done, here, meshed):
     """Of first order and with elements half as long the error is twice the change, a quarter of it the sd of that."""
-    said = cli("ensemble", *meshed, *FINER)
-    assert said.status == 0, said.err
+    said = done("ensemble", *meshed, *FINER)
     fine = next((here / "out" / "draws").glob("fine-*")).name
     assert len(started(here)) == 7
     draws = [float(row["force"]) for row in rows_of(here / "out" / "draws.csv")]
@@ -65,29 +64,29 @@ def test_the_band_is_that_for_elements_without_size_and_the_mesh_has_a_share(cli
 
 
 @pytest.mark.slow
-def test_it_can_be_added_goes_on_is_in_the_recipe_and_another_finer_model_costs_one_run(cli, here, meshed):
-    assert cli("ensemble", *meshed, "--no-figures").status == 0
+def test_it_can_be_added_goes_on_is_in_the_recipe_and_another_finer_model_costs_one_run(done, here, meshed):
+    done("ensemble", *meshed, "--no-figures")
     assert "mesh_free_mean" not in rows_of(here / "out" / "quantities.csv")[0]
     for _ in range(2):
-        assert cli("ensemble", *meshed, *FINER).status == 0
+        done("ensemble", *meshed, *FINER)
         assert len(started(here)) == 7
     table = (here / "out" / "quantities.csv").read_bytes()
     assert 'finer_model = "finer/model/model.inp"' in (here / "out" / "run.toml").read_text(encoding="utf-8")
     command = meshed[meshed.index("--command") + 1]
     repeat = ["ensemble", "--config", "out/run.toml", "--command", command, "--no-figures", "--max-jobs", 1]
-    assert cli(*repeat, "--out", "again").status == 0
+    done(*repeat, "--out", "again")
     assert (here / "again" / "quantities.csv").read_bytes() == table
     assert len(started(here)) == 14
-    assert cli("ensemble", *meshed, *FINER, "--mesh-order", 2).status == 0
+    done("ensemble", *meshed, *FINER, "--mesh-order", 2)
     assert len(started(here)) == 14
     last = rows_of(here / "out" / "quantities.csv")[-1]
     assert float(last["mesh_free_mean"]) == pytest.approx((1 - 4 / 3 * 0.1) * float(last["mean"]))
     (here / "fine" / "model.inp").write_text(deck(54, "0.9"), encoding="utf-8")
-    assert cli("ensemble", *meshed, *FINER).status == 0
+    done("ensemble", *meshed, *FINER)
     assert len(started(here)) == 15
     last = rows_of(here / "out" / "quantities.csv")[-1]
     assert float(last["mesh_free_mean"]) == pytest.approx((1 - 3 / 2 * 0.1) * float(last["mean"]))
-    assert cli("ensemble", *meshed, *FINER, "--cell-ratio", 5).status == 0
+    done("ensemble", *meshed, *FINER, "--cell-ratio", 5)
     last = rows_of(here / "out" / "quantities.csv")[-1]
     assert float(last["mesh_free_mean"]) == pytest.approx((1 - 5 / 4 * 0.1) * float(last["mean"]))
 
@@ -118,7 +117,7 @@ def test_a_finer_model_that_cannot_be_used_is_refused_before_a_run(cli, here, me
     assert not (here / "out").exists()
 
 
-def test_a_quantity_that_the_finer_model_does_not_write_costs_two_runs(cli, here, meshed):
+def test_a_quantity_that_the_finer_model_does_not_write_costs_two_runs(cli, done, here, meshed):
     (here / "fine" / "model.inp").write_text(deck(16, "silent"), encoding="utf-8")
     said = cli("ensemble", *meshed, *FINER)
     assert said.status == 2
@@ -126,14 +125,13 @@ def test_a_quantity_that_the_finer_model_does_not_write_costs_two_runs(cli, here
     assert "on the finer mesh" in said.err
     assert len(started(here)) == 2
     (here / "fine" / "model.inp").write_text(deck(16, "0.9"), encoding="utf-8")
-    assert cli("ensemble", *meshed, *FINER).status == 0
+    done("ensemble", *meshed, *FINER)
     assert len(started(here)) == 8
 
 
-def test_a_run_that_fails_on_the_finer_mesh_is_told_and_leaves_the_band(cli, here, meshed):
+def test_a_run_that_fails_on_the_finer_mesh_is_told_and_leaves_the_band(done, here, meshed):
     (here / "fine" / "model.inp").write_text(deck(16, "fails"), encoding="utf-8")
-    said = cli("ensemble", *meshed, *FINER)
-    assert said.status == 0, said.err
+    said = done("ensemble", *meshed, *FINER)
     assert "error of the mesh is not known up to the end (draw" in " ".join(said.err.split() + said.out.split())
     assert len(rows_of(here / "out" / "draws.csv")) == 6
     assert not (here / "out" / "failures.csv").exists()
@@ -154,16 +152,15 @@ def test_the_finer_example_is_the_other_with_every_element_divided_into_four():
 
 @pytest.mark.finite_elements
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed: make system")
-def test_the_corrected_force_is_nearer_to_that_of_a_much_finer_mesh(cli, here, model):
+def test_the_corrected_force_is_nearer_to_that_of_a_much_finer_mesh(done, here, model):
     """A punch, whose edge is singular: elements of a quarter of the length, which have an error of their own."""
     text = (EXAMPLES / "indentation.inp").read_text(encoding="utf-8")
     text = text.replace("0.05, 1., 1e-4, 0.125", "0.5, 1., 1e-4, 0.5").replace("-0.8\n", "-0.1\n")
     for times in (1, 2, 4):
         (here / f"punch-{times}.inp").write_text(refined(text, times), encoding="utf-8")
     common = ["--replace", "TISSUE", "--qoi", "force=RF2@PUNCH", "--draws", 2, "--max-jobs", 1, "--no-figures"]
-    said = cli("ensemble", "run", "punch-1.inp", *common, "--finer-model", "punch-2.inp", "--out", "coarse")
-    assert said.status == 0, said.err
-    assert cli("ensemble", "run", "punch-4.inp", *common, "--out", "much-finer").status == 0
+    done("ensemble", "run", "punch-1.inp", *common, "--finer-model", "punch-2.inp", "--out", "coarse")
+    done("ensemble", "run", "punch-4.inp", *common, "--out", "much-finer")
     last = rows_of(here / "coarse" / "quantities.csv")[-1]
     wanted = float(rows_of(here / "much-finer" / "quantities.csv")[-1]["mean"])
     error, corrected = (abs(float(last[name]) / wanted - 1) for name in ("mean", "mesh_free_mean"))

@@ -7,8 +7,8 @@ import pytest
 from .models import DECK, started
 
 
-def test_another_run_or_model_or_setting_is_not_mixed_in(cli, here, model):
-    assert cli("ensemble", *model, "--no-figures").status == 0
+def test_another_run_or_model_or_setting_is_not_mixed_in(cli, done, here, model):
+    done("ensemble", *model, "--no-figures")
     said = cli("ensemble", *model, "--no-figures", "--seed", 5)
     assert (said.status, "other settings" in said.err) == (2, True)
     (here / "model.inp").write_text(DECK.replace("0.3", "0.31"), encoding="utf-8")
@@ -82,7 +82,7 @@ def test_without_a_model_or_a_question_it_says_what_to_give(cli, here, model):
     assert "give --qoi" in cli("ensemble", "run", "model.inp", "--replace", "TISSUE").err
 
 
-def test_files_of_one_name_are_refused(cli, here, model):
+def test_files_of_one_name_are_refused(cli, done, here, model):
     for name in "ab":
         (here / name).mkdir()
         (here / name / "q.py").write_text("def f(folder):\n    return 1\n")
@@ -92,12 +92,14 @@ def test_files_of_one_name_are_refused(cli, here, model):
     said = cli("ensemble", *model, "--also", "a/d.txt", "--also", "b/d.txt")
     assert (said.status, "called 'd.txt'" in said.err) == (2, True)
     assert not (here / "out").exists()
-    assert cli("ensemble", *model, "--no-figures", "--qoi", "x=a/q.py:f", "--qoi", "y=a/q.py:f").status == 0
+    done("ensemble", *model, "--no-figures", "--qoi", "x=a/q.py:f", "--qoi", "y=a/q.py:f")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("is_absolute", [True, False])
-def test_a_file_outside_of_the_folder_of_the_model_is_used_only_if_named_and_not_mixed(cli, here, model, is_absolute):
+def test_a_file_outside_of_the_folder_of_the_model_is_used_only_if_named_and_not_mixed(
+    cli, done, here, model, is_absolute
+):
     (here / "deck").mkdir()
     outside = here / "more.inp"
     outside.write_text("** nothing\n")
@@ -109,13 +111,13 @@ def test_a_file_outside_of_the_folder_of_the_model_is_used_only_if_named_and_not
     assert said.status == 2
     assert f"--also {outside}" in said.err
     assert not (here / "out").exists()
-    assert cli(*words, "--also", outside).status == 0
-    assert cli(*words, "--also", "more.inp").status == 0
+    done(*words, "--also", outside)
+    done(*words, "--also", "more.inp")
     command = model[model.index("--command") + 1]
     repeat = ["ensemble", "--config", "out/run.toml", "--command", command, "--out", "again", "--no-figures"]
     said = cli(*repeat)
     assert (said.status, f"--also {outside}" in said.err) == ((2, True) if is_absolute else (0, False)), said.err
-    assert cli(*repeat, *(["--also", outside] if is_absolute else [])).status == 0
+    done(*repeat, *(["--also", outside] if is_absolute else []))
     outside.write_text("** something\n")
     said = cli(*words, "--also", outside)
     assert (said.status, "another model" in said.err) == (2, True)

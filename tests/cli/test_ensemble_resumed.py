@@ -11,33 +11,27 @@ from .conftest import rows_of
 from .models import killed_after, started
 
 
-def test_what_is_done_is_not_done_again_and_another_quantity_needs_no_run(cli, here, model):
-    assert cli("ensemble", *model, "--no-figures").status == 0
+def test_what_is_done_is_not_done_again_and_another_quantity_needs_no_run(refused, done, here, model):
+    done("ensemble", *model, "--no-figures")
     assert len(started(here)) == 6
-    assert cli("ensemble", *model, "--no-figures").status == 0
+    done("ensemble", *model, "--no-figures")
     (here / "mine.py").write_text("def size(folder):\n    return (folder / 'model.dat').stat().st_size\n")
-    said = cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size")
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size")
     assert len(started(here)) == 6
     assert float(rows_of(here / "out" / "draws.csv")[0]["size"]) > 100
     repeat = ["ensemble", "--config", "out/run.toml", "--no-figures", "--out", "again", "--max-jobs", 1]
-    said = cli(*repeat)
-    assert said.status == 2
-    assert "--qoi size=quantities/mine.py:size" in said.err
-    assert "--command" in said.err
+    refused(["--qoi size=quantities/mine.py:size", "--command"], *repeat)
     assert len(started(here)) == 6
     command = model[model.index("--command") + 1]
-    said = cli(*repeat, "--qoi", "size=quantities/mine.py:size", "--command", command)
-    assert said.status == 0, said.err
+    done(*repeat, "--qoi", "size=quantities/mine.py:size", "--command", command)
     assert len(started(here)) == 12
     first, again = ((here / name / "quantities.csv").read_text(encoding="utf-8") for name in ("out", "again"))
     assert first == again
 
 
-def test_a_draw_that_fails_is_listed_with_the_last_lines_and_made_again_on_request(cli, here, model):
+def test_a_draw_that_fails_is_listed_with_the_last_lines_and_made_again_on_request(done, here, model):
     (here / "fails").write_text("3")
-    said = cli("ensemble", *model, "--no-figures")
-    assert said.status == 0, said.err
+    said = done("ensemble", *model, "--no-figures")
     told = "1 of 6 draws failed (draw 3 at time 0.5; first reason: increment size smaller than minimum)"
     assert told in " ".join(said.out.split())
     (row,) = rows_of(here / "out" / "failures.csv")
@@ -46,36 +40,34 @@ def test_a_draw_that_fails_is_listed_with_the_last_lines_and_made_again_on_reque
     halves = rows_of(here / "out" / "quantities.csv")
     assert [row["draws"] for row in halves] == ["6", "5"]
     (here / "fails").unlink()
-    assert cli("ensemble", *model, "--no-figures", "--again").status == 0
+    done("ensemble", *model, "--no-figures", "--again")
     assert started(here)[6:] == [started(here)[-1]]
     assert not (here / "out" / "failures.csv").exists()
 
 
-def test_a_run_that_fails_once_is_made_again_where_that_is_allowed(cli, here, model):
+def test_a_run_that_fails_once_is_made_again_where_that_is_allowed(done, here, model):
     (here / "sometimes").touch()
-    said = cli("ensemble", *model, "--no-figures", "--retries", 1)
-    assert said.status == 0, said.err
+    said = done("ensemble", *model, "--no-figures", "--retries", 1)
     assert "failed" not in said.out
     assert len(started(here)) == 7
 
 
-def test_the_files_of_the_solver_go_where_they_are_not_kept(cli, here, model):
-    assert cli("ensemble", *model, "--no-figures", "--no-keep").status == 0
+def test_the_files_of_the_solver_go_where_they_are_not_kept(done, here, model):
+    done("ensemble", *model, "--no-figures", "--no-keep")
     assert {path.name for path in (here / "out" / "draws").rglob("*") if path.is_file()} == {"run.json", "solver.log"}
-    assert cli("ensemble", *model, "--no-figures", "--no-keep").status == 0
+    done("ensemble", *model, "--no-figures", "--no-keep")
     assert len(started(here)) == 6
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
-def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, model):
+def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(done, here, model):
     (here / "slow").write_text("0.5")
     results = here / "out" / "tasks.jsonl"
-    done = killed_after(3, results, here, "ensemble", *model, "--no-figures")
+    kept = killed_after(3, results, here, "ensemble", *model, "--no-figures")
     (here / "slow").unlink()
-    said = cli("ensemble", *model, "--no-figures")
-    assert said.status == 0, said.err
-    assert results.read_text(encoding="utf-8").splitlines()[:3] == done
+    done("ensemble", *model, "--no-figures")
+    assert results.read_text(encoding="utf-8").splitlines()[:3] == kept
     runs = [name.rpartition("complete-")[2][0] for name in started(here)]
     assert [runs.count(number) for number in "123"] == [1, 1, 1]
     assert set(runs) == set("123456")
@@ -85,9 +77,9 @@ def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, mod
 
 @pytest.mark.parametrize("name", ["../../precious", "..", ".", "/", None])
 @pytest.mark.parametrize("is_other", [False, True], ids=["same", "other-quantities"])
-def test_making_failures_again_deletes_no_other_folder(cli, here, model, name, is_other):
+def test_making_failures_again_deletes_no_other_folder(done, here, model, name, is_other):
     (here / "fails").write_text("3")
-    assert cli("ensemble", *model, "--no-figures").status == 0
+    done("ensemble", *model, "--no-figures")
     (here / "precious").mkdir()
     (here / "precious" / "data.txt").write_text("1")
     place = name if name != "/" else str(here / "precious")
@@ -101,23 +93,21 @@ def test_making_failures_again_deletes_no_other_folder(cli, here, model, name, i
     (here / "fails").unlink()
     (here / "mine.py").write_text("def one(folder):\n    return 1\n")
     others = ["--qoi", "one=mine.py:one"] if is_other else []
-    said = cli("ensemble", *model, "--no-figures", "--again", *others)
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures", "--again", *others)
     assert (here / "precious" / "data.txt").exists()
     assert len(list((here / "out" / "draws").iterdir())) == 6
     assert len(started(here)) == (6 if is_other else 7)
 
 
-def test_making_the_first_draw_again_leaves_the_other_results(cli, here, model):
+def test_making_the_first_draw_again_leaves_the_other_results(done, here, model):
     (here / "fails").write_text("1")
-    assert cli("ensemble", *model, "--no-figures", "--no-keep").status == 0
+    done("ensemble", *model, "--no-figures", "--no-keep")
     (here / "fails").unlink()
-    said = cli("ensemble", *model, "--no-figures", "--no-keep", "--again")
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures", "--no-keep", "--again")
     assert len(started(here)) == 7
 
 
-def test_a_function_that_cannot_read_is_told_with_the_option_that_reads_again(cli, here, model):
+def test_a_function_that_cannot_read_is_told_with_the_option_that_reads_again(cli, done, here, model):
     (here / "mine.py").write_text(f"def size(folder):\n    return float(open({str(here / 'size.txt')!r}).read())\n")
     for _ in range(2):
         said = cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size")
@@ -125,17 +115,15 @@ def test_a_function_that_cannot_read_is_told_with_the_option_that_reads_again(cl
         assert "FileNotFoundError" in said.err
         assert "--again" in said.err
     (here / "size.txt").write_text("3")
-    said = cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size", "--again")
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size", "--again")
 
 
-def test_a_draw_whose_results_are_cut_short_fails_alone(cli, here, model):
+def test_a_draw_whose_results_are_cut_short_fails_alone(done, here, model):
     text = (here / "stub.py").read_text()
     cut = "    if 'complete-4' in folder.name:\n        table = Path(f'{job}.dat')\n"
     cut += "        table.write_text(table.read_text().replace(' 0.0\\n', '\\n'))\n"
     (here / "stub.py").write_text(text.replace("    rows = [", cut + "    rows = ["))
-    said = cli("ensemble", *model, "--no-figures")
-    assert said.status == 0, said.err
+    done("ensemble", *model, "--no-figures")
     (row,) = rows_of(here / "out" / "failures.csv")
     assert row["number"] == "4"
     assert "cut short or damaged" in row["problem"]

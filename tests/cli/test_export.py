@@ -30,11 +30,10 @@ def run(earlier, here):
     return "runs/specimen"
 
 
-def test_a_run_becomes_the_cards_of_its_posterior(cli, here, run):
-    said = cli(
+def test_a_run_becomes_the_cards_of_its_posterior(done, here, run):
+    said = done(
         "export", run, "--discrepancy", "none", "--draws", 4, "--unit", "kPa", "--format", "calculix", "--seed", 3
     )
-    assert said.status == 0, said.err
     assert "exactly: NEO HOOKE" in " ".join(said.out.split())
     assert "cards/specimen-calculix/draw-1.inp to draw-4.inp" in said.out
     rows = rows_of(here / "cards" / "specimen-calculix" / "index.csv")
@@ -47,9 +46,8 @@ def test_a_run_becomes_the_cards_of_its_posterior(cli, here, run):
     assert "run specimen of tissuq, sobol draws from seed 3" in " ".join(text.split())
 
 
-def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
-    said = cli("export", run, "--draws", 4, "--all-draws", "--law", "ogden", "--order", 3, "--out", "mine")
-    assert said.status == 0, said.err
+def test_a_free_energy_is_projected_and_its_error_said(done, here, run):
+    said = done("export", run, "--draws", 4, "--all-draws", "--law", "ogden", "--order", 3, "--out", "mine")
     words = " ".join(said.out.split())
     assert "nearest OGDEN, N=3" in words
     assert "root mean square" in words
@@ -58,14 +56,13 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
     assert "PROJECTION" in text
 
 
-def test_cards_say_what_the_fit_says_of_finite_elements(cli, here, run):
+def test_cards_say_what_the_fit_says_of_finite_elements(done, here, run):
     result = here / run / "result.json"
     record = json.loads(result.read_text())
     (of_fit,) = (use for use in record["uses"] if use["purpose"].startswith("simulate"))
     of_fit |= {"verdict": "no", "reason": "it was made so by a test"}
     result.write_text(json.dumps(record))
-    said = cli("export", run, "--draws", 2)
-    assert said.status == 0, said.err
+    said = done("export", run, "--draws", 2)
     assert said.out.startswith("  NO  use of the fit in finite elements: it was made so by a test\n")
     assert "Next: do not use this yet; next step of the fit: " in said.out
     for text in (here / "cards" / "specimen-abaqus").glob("*.inp"):
@@ -101,9 +98,8 @@ def test_what_cannot_be_is_refused_and_nothing_written(refused, run, options, wo
     refused([words], "export", run, *options)
 
 
-def test_tables_are_called_so(cli, here, run):
-    said = cli("export", run, "--discrepancy", "none", "--draws", 2, "--format", "table")
-    assert said.status == 0, said.err
+def test_tables_are_called_so(done, here, run):
+    said = done("export", run, "--discrepancy", "none", "--draws", 2, "--format", "table")
     assert "Tables: cards/specimen-table/draw-1.csv" in said.out
     assert "card " not in said.out
     assert "In the tables: calibrated stretches" in said.out
@@ -117,21 +113,17 @@ def test_cards_are_never_overwritten_unasked(cli, here, run):
         assert ("exists" in said.err) == (status == 2)
 
 
-def test_fibres_have_cards_for_the_codes_that_have_them(cli, here):
+def test_fibres_have_cards_for_the_codes_that_have_them(refused, done, here):
     rows = [f"{x},{y},{100 * (x - 1):.3f},{90 * (y - 1):.3f}" for x in (1.05, 1.1, 1.2) for y in (1.02, 1.1, 1.15)]
     (here / "sheet.csv").write_text("stretch x,stretch y,stress x (kPa),stress y (kPa)\n" + "\n".join(rows) + "\n")
-    fitted = cli(
+    done(
         "fit", "sheet.csv", "--mode", "biaxial", "--material", "neo-hookean+standard-fibres:one@0", "--noise-sd", 1,
         "--discrepancy", "none", "--no-figures",
     )  # fmt: skip
-    assert fitted.status == 0, fitted.err
-    said = cli("export", "runs/sheet", "--format", "calculix", "--draws", 2)
-    assert said.status == 0, said.err
+    done("export", "runs/sheet", "--format", "calculix", "--draws", 2)
     (first, _) = sorted((here / "cards" / "sheet-calculix").glob("*.inp"))
     assert "*MATERIAL, NAME=ELASTIC_FIBER_TISSUE\n*USER MATERIAL, CONSTANTS=6\n" in first.read_text()
-    said = cli("export", "runs/sheet", "--format", "ls-dyna")
-    assert said.status == 2
-    assert "abaqus or calculix or febio" in said.err
+    refused(["abaqus or calculix or febio"], "export", "runs/sheet", "--format", "ls-dyna")
 
 
 def test_the_help_names_every_format(cli):

@@ -82,14 +82,14 @@ def test_a_run_is_repeated_byte_for_byte_from_its_run_toml_after_the_users_file_
 
 
 @pytest.mark.parametrize("noise_kpa", [1.0, 2.5])
-def test_noise_and_priors_are_in_the_stress_unit_of_the_file(cli, here, specimen, noise_kpa):
+def test_noise_and_priors_are_in_the_stress_unit_of_the_file(done, here, specimen, noise_kpa):
     options = ["--noise-sd", noise_kpa, "--prior", "C10=uniform(10,110)"]
-    assert cli("fit", specimen, *options, *ALONE).status == 0
+    done("fit", specimen, *options, *ALONE)
     assert_closed_form(summary_of(here / "runs" / "specimen")[0], noise_kpa, width_kpa=100)
 
 
-def test_the_table_in_the_terminal_is_in_the_stress_unit_of_the_file(cli, here, specimen):
-    assert cli("fit", specimen, "--noise-sd", 1, *ALONE).status == 0
+def test_the_table_in_the_terminal_is_in_the_stress_unit_of_the_file(cli, done, here, specimen):
+    done("fit", specimen, "--noise-sd", 1, *ALONE)
     said = cli("show", "runs/specimen", "--details")
     line = next(line for line in said.out.splitlines() if line.strip().startswith("none"))
     size = unit_stress @ unit_stress
@@ -112,43 +112,39 @@ def test_the_table_in_the_terminal_is_in_the_stress_unit_of_the_file(cli, here, 
     ],
     ids=["named columns", "numbered columns", "percent", "cauchy", "compression positive", "plain"],
 )
-def test_every_way_to_give_the_same_measurements_gives_the_same_posterior(cli, here, columns, options):
+def test_every_way_to_give_the_same_measurements_gives_the_same_posterior(done, here, columns, options):
     file = written(here / "test.csv", **columns)
-    said = cli("fit", file, *options, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)
-    assert said.status == 0, said.err
+    done("fit", file, *options, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)
     assert_closed_form(summary_of(here / "runs" / "test")[0])
 
 
 @pytest.mark.parametrize(("unit", "kpa"), [("Pa", 1e-3), ("N/cm2", 10), ("psi", 6.894757293168361)])
-def test_any_unit_of_stress_is_converted(cli, here, unit, kpa):
+def test_any_unit_of_stress_is_converted(done, here, unit, kpa):
     file = written(here / "test.csv", stretch=stretch, stress=stress / kpa)
-    said = cli("fit", file, "--stress-unit", unit, "--noise-sd", 1 / kpa, *ALONE)
-    assert said.status == 0, said.err
+    said = done("fit", file, "--stress-unit", unit, "--noise-sd", 1 / kpa, *ALONE)
     assert_closed_form(summary_of(here / "runs" / "test")[0])
     assert re.search(rf"C10 +[\d.]+ {unit}, 95 % interval", said.out)
 
 
-def test_unknown_noise_is_a_parameter(cli, here, specimen):
-    assert cli("fit", specimen, "--noise-sd", "unknown", *ALONE).status == 0
+def test_unknown_noise_is_a_parameter(done, here, specimen):
+    done("fit", specimen, "--noise-sd", "unknown", *ALONE)
     lines = (here / "runs" / "specimen" / "parameters.csv").read_text().splitlines()
     assert [line.split(",")[1] for line in lines[1:]] == ["C10", "noise_sd"]
 
 
-def test_the_material_and_the_discrepancy_can_be_chosen(cli, here, specimen):
-    said = cli("fit", specimen, "--material", "yeoh", "--discrepancy", "none", "--discrepancy", "constant",
+def test_the_material_and_the_discrepancy_can_be_chosen(done, here, specimen):
+    said = done("fit", specimen, "--material", "yeoh", "--discrepancy", "none", "--discrepancy", "constant",
                "--noise-sd", 1, "--no-figures")  # fmt: skip
-    assert said.status == 0, said.err
     assert [row["formulation"] for row in summary_of(here / "runs" / "specimen")] == ["none", "constant"]
     assert "specimen: yeoh" in said.out
 
 
 @pytest.mark.parametrize("names", [["none", "quadratic", "yeoh"], pytest.param(None, marks=pytest.mark.slow)])
-def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(cli, here, specimen, monkeypatch, names):
+def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(done, here, specimen, monkeypatch, names):
     """The short version has three discrepancies, of which one can be fitted."""
     if names:
         monkeypatch.setattr("tissuq.studies.specimen._every", lambda: names)
-    said = cli("fit", specimen, "--material", "yeoh", "--discrepancy", "all", "--noise-sd", 1, "--no-figures")
-    assert said.status == 0, said.err
+    said = done("fit", specimen, "--material", "yeoh", "--discrepancy", "all", "--noise-sd", 1, "--no-figures")
     fitted = [row["formulation"] for row in summary_of(here / "runs" / "specimen")]
     assert "yeoh" not in fitted
     assert "none" in fitted
@@ -156,22 +152,20 @@ def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(cli
     assert "Not fitted: quadratic: 6 measurements are too few" in said.out
 
 
-def test_a_built_in_data_set_is_fitted_by_its_name(cli, here):
-    assert cli("fit", "rubber-treloar-uniaxial", *ALONE).status == 0
+def test_a_built_in_data_set_is_fitted_by_its_name(done, here):
+    done("fit", "rubber-treloar-uniaxial", *ALONE)
     assert (here / "runs" / "rubber-treloar-uniaxial" / "input" / "rubber-treloar-uniaxial.csv").exists()
 
 
-def test_a_file_beside_a_config_that_names_the_same_measurements_is_accepted(cli, here, specimen):
-    assert cli("fit", specimen, "--noise-sd", 1, *ALONE, "--out", "first").status == 0
-    said = cli("fit", specimen, "--config", "first/run.toml", "--no-figures", "--out", "second")
-    assert said.status == 0, said.err
+def test_a_file_beside_a_config_that_names_the_same_measurements_is_accepted(done, here, specimen):
+    done("fit", specimen, "--noise-sd", 1, *ALONE, "--out", "first")
+    done("fit", specimen, "--config", "first/run.toml", "--no-figures", "--out", "second")
     assert_closed_form(summary_of(here / "second")[0])
 
 
-def test_an_option_prevails_over_the_config(cli, here, specimen):
+def test_an_option_prevails_over_the_config(cli, done, here, specimen):
     cli("fit", specimen, "--noise-sd", 1, "--prior", "C10=uniform(10,110)", *ALONE, "--out", "first")
-    said = cli("fit", "--config", "first/run.toml", "--noise-sd", 2.5, "--no-figures", "--out", "second")
-    assert said.status == 0, said.err
+    done("fit", "--config", "first/run.toml", "--noise-sd", 2.5, "--no-figures", "--out", "second")
     assert_closed_form(summary_of(here / "second")[0], 2.5, width_kpa=100)
 
 
@@ -180,55 +174,50 @@ def test_an_option_prevails_over_the_config(cli, here, specimen):
     [(["--noise-sd", 1], ["--noise", "proportional"]), (["--noise", "proportional"], ["--noise-sd", 2.5])],
     ids=["known, then proportional", "proportional, then known"],
 )
-def test_an_option_of_the_noise_prevails_over_any_noise_of_the_config(cli, here, specimen, first, second):
-    assert cli("fit", specimen, *first, *ALONE, "--out", "first").status == 0
-    said = cli("fit", "--config", "first/run.toml", *second, "--no-figures", "--out", "second")
-    assert said.status == 0, said.err
+def test_an_option_of_the_noise_prevails_over_any_noise_of_the_config(done, here, specimen, first, second):
+    done("fit", specimen, *first, *ALONE, "--out", "first")
+    done("fit", "--config", "first/run.toml", *second, "--no-figures", "--out", "second")
     kinds = [line.split(",")[1] for line in (here / "second" / "parameters.csv").read_text().splitlines()[1:]]
     assert kinds == (["C10"] if "--noise-sd" in second else ["C10", "noise_sd", "noise_share"])
 
 
-def test_proportional_noise_and_repeats_can_be_chosen(cli, here, specimen):
-    assert cli("fit", specimen, "--noise", "proportional", *ALONE).status == 0
+def test_proportional_noise_and_repeats_can_be_chosen(done, here, specimen):
+    done("fit", specimen, "--noise", "proportional", *ALONE)
     lines = (here / "runs" / "specimen" / "parameters.csv").read_text().splitlines()
     assert [line.split(",")[1] for line in lines[1:]] == ["C10", "noise_sd", "noise_share"]
     twice = written(here / "twice.csv", stretch=np.repeat(stretch, 2), stress=np.repeat(stress, 2) + [0.5, -0.5] * 6)
-    said = cli("fit", twice, "--stress-unit", "kPa", "--noise", "repeats", "--discrepancy", "constant", "--no-figures")
-    assert said.status == 0, said.err
+    done("fit", twice, "--stress-unit", "kPa", "--noise", "repeats", "--discrepancy", "constant", "--no-figures")
     lines = (here / "runs" / "twice" / "parameters.csv").read_text().splitlines()
     assert [line.split(",")[1] for line in lines[1:]] == ["C10", "m0", "S", "noise_sd"]
 
 
-def test_a_material_of_other_parameters_is_summarised_by_its_first_one(cli, here, specimen):
-    said = cli("fit", specimen, "--material", "ogden-1", "--noise-sd", 1, "--prior", "mu1=uniform(-500,500)", *ALONE)
-    assert said.status == 0, said.err
+def test_a_material_of_other_parameters_is_summarised_by_its_first_one(done, here, specimen):
+    said = done("fit", specimen, "--material", "ogden-1", "--noise-sd", 1, "--prior", "mu1=uniform(-500,500)", *ALONE)
     (row,) = summary_of(here / "runs" / "specimen")
     # the measurements are neo-Hookean with C10 = 50 kPa: mu1 = 2 C10
     assert float(row["mu1_mean"]) == pytest.approx(0.1, abs=4 * float(row["mu1_sd"]))
     assert re.search(r"mu1 +[\d.]+ kPa, 95 % interval", said.out)
 
 
-def test_a_name_with_markup_and_spaces_is_shown_as_it_is(cli, here):
+def test_a_name_with_markup_and_spaces_is_shown_as_it_is(done, here):
     file = written(here / "<b>pig & cow</b>".replace("/", "_"), stretch=stretch, stress=stress)
-    said = cli("fit", file, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)
-    assert said.status == 0, said.err
+    done("fit", file, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)
     (report,) = (here / "runs").glob("*/report.html")
     text = report.read_text()
     assert "&lt;b&gt;pig &amp; cow&lt;_b&gt;" in text
     assert "<b>" not in text
 
 
-def test_show_prints_what_fit_printed(cli, here, specimen):
+def test_show_prints_what_fit_printed(cli, done, here, specimen):
     fitted = cli("fit", specimen, "--noise-sd", 1, *ALONE)
-    shown = cli("show", "runs/specimen")
-    assert shown.status == 0
+    shown = done("show", "runs/specimen")
     assert fitted.out == shown.out
     assert "Warning: " in shown.out  # of the test's design
     assert tomllib.loads((here / "runs" / "specimen" / "run.toml").read_text())["file"] == "input/specimen.csv"
 
 
-def test_show_gives_programs_what_the_files_hold(cli, here, specimen):
-    assert cli("fit", specimen, "--noise-sd", 1, *ALONE).status == 0
+def test_show_gives_programs_what_the_files_hold(cli, done, here, specimen):
+    done("fit", specimen, "--noise-sd", 1, *ALONE)
     shown = json.loads(cli("show", "runs/specimen", "--json").out)
     files = {name: json.loads((here / "runs" / "specimen" / f"{name}.json").read_text()) for name in shown}
     files["result"]["next"] = files["result"]["next"].replace("{run}", "runs/specimen")
@@ -273,9 +262,8 @@ def test_show_refuses_what_is_not_a_run_folder(cli, specimen, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("discrepancy", ["gp-orthogonal", "gp-scaled"])
-def test_an_estimate_of_the_best_fit_says_so_beside_its_numbers(cli, here, specimen, discrepancy):
-    said = cli("fit", specimen, "--discrepancy", discrepancy, "--noise-sd", 1, "--no-figures")
-    assert said.status == 0, said.err
+def test_an_estimate_of_the_best_fit_says_so_beside_its_numbers(cli, done, here, specimen, discrepancy):
+    said = done("fit", specimen, "--discrepancy", discrepancy, "--noise-sd", 1, "--no-figures")
     report = (here / "runs" / "specimen" / "report.html").read_text(encoding="utf-8")
     for text in (said.out + said.err, report, cli("discrepancies").out):
         assert "not the initial modulus" in " ".join(text.split())
@@ -293,13 +281,12 @@ def test_an_estimate_of_the_best_fit_says_so_beside_its_numbers(cli, here, speci
     ],
     ids=["two points", "two points, auto", "nothing near the reference", "noise above the signal"],
 )
-def test_data_that_say_little_give_a_report_with_a_warning(cli, here, stretches, noise_kpa, told, words, discrepancy):
+def test_data_that_say_little_give_a_report_with_a_warning(done, here, stretches, noise_kpa, told, words, discrepancy):
     points = np.array(stretches)
     values = 100 * (points - points**-2) + noise_kpa * np.random.default_rng(3).standard_normal(len(points))
     file = written(here / "poor.csv", stretch=points, stress=values)
     options = ["--stress-unit", "kPa", "--noise-sd", told, "--discrepancy", discrepancy, "--no-figures"]
-    said = cli("fit", file, *options, "--out", "run")
-    assert said.status == 0, said.err
+    said = done("fit", file, *options, "--out", "run")
     assert words in " ".join(said.out.split())
     (row,) = summary_of(here / "run")
     assert float(row["C10_hdi_low"]) < 0.05 < float(row["C10_hdi_high"])
@@ -308,11 +295,11 @@ def test_data_that_say_little_give_a_report_with_a_warning(cli, here, stretches,
 
 
 @pytest.mark.parametrize("material", slow_but(["neo-hookean"], ["neo-hookean", "mooney-rivlin"]))
-def test_a_fit_of_stable_materials_is_repeated_from_its_run_toml(cli, here, material):
+def test_a_fit_of_stable_materials_is_repeated_from_its_run_toml(done, here, material):
     asked = ("--material", material, "--stable-in", "uniaxial")
-    assert cli("fit", "rubber-treloar-uniaxial", *asked, *ALONE, "--out", "first").status == 0
+    done("fit", "rubber-treloar-uniaxial", *asked, *ALONE, "--out", "first")
     assert 'stable_in = [\n    "uniaxial",\n]' in (here / "first" / "run.toml").read_text()
-    assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "second").status == 0
+    done("fit", "--config", "first/run.toml", "--no-figures", "--out", "second")
     first, second = summary_of(here / "first")[0], summary_of(here / "second")[0]
     assert (first["C10_mean"], first["stable"]) == (second["C10_mean"], "1.0")
 
@@ -334,13 +321,13 @@ def test_the_default_interval_of_a_file_is_of_the_specimen_and_says_so(cli, here
     assert "of the stress of a specimen (its area" not in (here / "as-tested" / "report.html").read_text()
 
 
-def test_a_size_replaces_that_of_the_estimand_and_a_run_repeats_with_both(cli, here, specimen):
+def test_a_size_replaces_that_of_the_estimand_and_a_run_repeats_with_both(done, here, specimen):
     options = ["--estimand", "specimen", "--tolerance", "test=0", "--tolerance", "slack=2%"]
-    assert cli("fit", specimen, *options, *ALONE, "--out", "first").status == 0
+    done("fit", specimen, *options, *ALONE, "--out", "first")
     model = tq.load(here / "first").model
     assert model.tolerances == tq.Tolerances("specimen", test=0, slack=0.02)
     assert (model.tolerances.sizes["length"], "test" in model.tolerances.sizes) == (0.01, False)
-    assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "second").status == 0
+    done("fit", "--config", "first/run.toml", "--no-figures", "--out", "second")
     assert tq.load(here / "second").model.tolerances == model.tolerances
 
 
@@ -352,12 +339,11 @@ def test_an_estimand_that_does_not_exist_is_refused(cli, here, specimen):
 
 
 @pytest.mark.slow
-def test_the_page_and_the_terminal_say_that_errors_are_correlated(cli, here):
+def test_the_page_and_the_terminal_say_that_errors_are_correlated(done, here):
     points, score = np.linspace(0.8, 1.5, 60), np.random.default_rng(4).standard_normal(60)
     errors = np.convolve(score, 0.7 ** np.arange(8))[:60]
     file = written(here / "drift.csv", stretch=points, stress=600 * (points - points**-2) + 10 * errors)
-    said = cli("fit", file, "--stress-unit", "kPa", "--discrepancy", "taylor", "--no-figures", "--out", "run")
-    assert said.status == 0, said.err
+    done("fit", file, "--stress-unit", "kPa", "--discrepancy", "taylor", "--no-figures", "--out", "run")
     assert "correlated (lag-1 correlation 0." in (here / "run" / "report.html").read_text(encoding="utf-8")
 
 
@@ -382,7 +368,6 @@ def test_what_is_said_of_each_of_several_files_is_refused_beside_a_config(cli, f
     assert words in said.err
 
 
-def test_a_mode_prevails_over_that_of_a_config(cli, fit_run, here):
-    said = cli("fit", "--config", fit_run[0] / "run.toml", "--out", "again", "--mode", "equibiaxial", "--no-figures")
-    assert said.status == 0, said.err
+def test_a_mode_prevails_over_that_of_a_config(done, fit_run, here):
+    done("fit", "--config", fit_run[0] / "run.toml", "--out", "again", "--mode", "equibiaxial", "--no-figures")
     assert 'mode = "equibiaxial"' in (here / "again" / "run.toml").read_text()

@@ -122,10 +122,9 @@ def test_the_page_says_with_which_priors_the_claims_are_confirmed_whatever_those
     assert "c on [0, 1] MPa" in question
 
 
-def test_show_prints_the_study(cli, paper_run):
+def test_show_prints_the_study(done, paper_run):
     folder, said = paper_run
-    shown = cli("show", folder)
-    assert shown.status == 0
+    shown = done("show", folder)
     assert shown.out.split("The question")[0] == said.out.split("The question")[0]
 
 
@@ -202,17 +201,15 @@ def test_options_on_the_command_line_prevail_over_the_file_before_the_study(cli,
 
 
 @pytest.mark.slow
-def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_priors(cli, here):
+def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_priors(done, here):
     (here / "base.toml").write_text(BASE)
-    said = cli("paper", "--config", "base.toml", *OPTIONS, "--out", "run")
-    assert said.status == 0, said.err
+    done("paper", "--config", "base.toml", *OPTIONS, "--out", "run")
     assert_of_both(tomllib.loads((here / "run" / "run.toml").read_text()))
 
 
 @pytest.mark.slow
-def test_replicates_count_how_often_each_claim_holds(cli, here, one_range, empty_posteriors):
-    said = cli("paper", "--points", 6, "--replicates", 2, "--no-figures", "--out", "run")
-    assert said.status == 0, said.err
+def test_replicates_count_how_often_each_claim_holds(done, here, one_range, empty_posteriors):
+    done("paper", "--points", 6, "--replicates", 2, "--no-figures", "--out", "run")
     claims = rows_of(here / "run" / "claims.csv")
     assert {int(row["decided"]) for row in claims} <= {0, 1, 2}
     assert all(int(row["times"]) <= int(row["decided"]) for row in claims)

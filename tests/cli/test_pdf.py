@@ -9,8 +9,8 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 @pytest.fixture
-def run(cli, here, specimen):
-    assert cli("fit", specimen, *ALONE, "--out", "run").status == 0
+def run(done, here, specimen):
+    done("fit", specimen, *ALONE, "--out", "run")
     return here / "run"
 
 
@@ -24,27 +24,20 @@ def test_a_report_is_printed_as_a_pdf(cli, here, run):
     assert b"/Page" in content
 
 
-def test_without_a_browser_a_message_says_what_to_do(cli, here, run, monkeypatch):
+def test_without_a_browser_a_message_says_what_to_do(refused, here, run, monkeypatch):
     monkeypatch.setenv("PATH", str(here))
-    said = cli("show", "run", "--pdf", "report.pdf")
-    assert said.status == 2
-    assert "tissuq doctor" in said.err
-    assert "run/report.html" in said.err
+    refused(["tissuq doctor", "run/report.html"], "show", "run", "--pdf", "report.pdf")
     assert not (here / "report.pdf").exists()
 
 
-def test_a_browser_that_fails_is_told_with_its_last_words(cli, here, run, monkeypatch):
+def test_a_browser_that_fails_is_told_with_its_last_words(refused, here, run, monkeypatch):
     program = here / "chromium"
     program.write_text("#!/bin/sh\necho first >&2\necho no display >&2\nexit 3\n")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(here))
-    said = cli("show", "run", "--pdf", "report.pdf")
-    assert said.status == 2
-    assert "no display" in said.err
+    refused(["no display"], "show", "run", "--pdf", "report.pdf")
     assert not (here / "report.pdf").exists()
 
 
-def test_a_folder_without_a_page_is_refused(cli, here):
-    said = cli("show", "nowhere", "--pdf", "report.pdf")
-    assert said.status == 2
-    assert "nowhere/report.html" in said.err
+def test_a_folder_without_a_page_is_refused(refused, here):
+    refused(["nowhere/report.html"], "show", "nowhere", "--pdf", "report.pdf")

@@ -18,7 +18,7 @@ from tissuq.result_warning import merged
 from tissuq.studies import population
 from tissuq.studies.population import PopulationSettings
 
-from .conftest import STRETCH, command, rows_of, run_in
+from .conftest import STRETCH, command, done_in, rows_of, run_in
 from .models import write_model
 
 MODULI_KPA = [40.0, 48.0, 52.0, 60.0, 75.0, 45.0]
@@ -48,8 +48,7 @@ def write_all(folder):
 def population_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("population")
     write_all(folder)
-    said = run_in(folder, "population", "specimens", *OPTIONS, "--out", "run")
-    assert said.status == 0, said.err
+    said = done_in(folder, "population", "specimens", *OPTIONS, "--out", "run")
     return folder, said
 
 
@@ -111,8 +110,7 @@ def test_predictions_and_cards_start_from_a_new_patient(population_run):
     uses = json.loads((folder / "run" / "result.json").read_text())["uses"]
     (use,) = (use for use in uses if use["purpose"] == "compute with a new specimen")
     for arguments in (["predict", "run", "--mode", "planar", "--points", 3, "--no-figures"], ["export", "run"]):
-        said = run_in(folder, *arguments)
-        assert said.status == 0, said.err
+        said = done_in(folder, *arguments)
         assert use["reason"] in " ".join(said.out.split())
 
 
@@ -132,8 +130,7 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     command_of_stub = write_model(tmp_path)
     options = ["--command", command_of_stub, "--draws", 64, "--unit", "kPa", "--no-figures", "--max-jobs", 1]
     words = ["ensemble", folder / "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", *options]
-    said = run_in(tmp_path, *words, "--solver", "ccx", "--out", "forces")
-    assert said.status == 0, said.err
+    said = done_in(tmp_path, *words, "--solver", "ccx", "--out", "forces")
     assert "those of a new specimen of the population of 6 specimens" in " ".join(said.out.split())
     forces = np.array([float(row["force"]) for row in rows_of(tmp_path / "forces" / "draws.csv")])
     row = next(row for row in rows_of(folder / "run" / "population.csv") if row["quantity"] == "new specimen")
@@ -141,14 +138,13 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     inside = (forces > float(row["hdi_low"])) & (forces < float(row["hdi_high"]))
     assert 0.85 <= inside.mean() < 1
     small = ["--case", "bar", "--draws", 4, "--steps", 1, "--size", "fineness=0.5", "--workers", 1, "--no-figures"]
-    said = run_in(tmp_path, "structure", folder / "run", *small, "--out", "bar")
-    assert said.status == 0, said.err
+    done_in(tmp_path, "structure", folder / "run", *small, "--out", "bar")
     with xr.open_dataset(tmp_path / "bar" / "curves.nc") as curves:
         ratio = curves["force_complete"].values[:, -1] / curves["parameter_C10"].values
     assert ratio == pytest.approx(ratio[0], rel=1e-6)
     assert "those of a new specimen of the population" in (tmp_path / "bar" / "report.html").read_text()
     again = ["structure", "--config", "bar/run.toml", "--workers", 1, "--no-figures", "--out", "again"]
-    assert run_in(tmp_path, *again).status == 0
+    done_in(tmp_path, *again)
     assert (tmp_path / "again" / "forces.csv").read_bytes() == (tmp_path / "bar" / "forces.csv").read_bytes()
 
 
@@ -280,26 +276,24 @@ def test_specimens_are_left_out_by_name(here):
 
 
 @pytest.mark.slow
-def test_specimens_may_be_tested_in_several_modes(cli, here):
+def test_specimens_may_be_tested_in_several_modes(done, here):
     """Files say their mode by a comment or by their name; a run folder keeps both."""
     write_modes(here)
-    said = cli("population", "all", *OPTIONS, "--no-figures", "--out", "run")
-    assert said.status == 0, said.err
+    done("population", "all", *OPTIONS, "--no-figures", "--out", "run")
     assert {row["mode"] for row in rows_of(here / "run" / "data.csv")} == {"uniaxial", "planar"}
     assert {row["mode"] for row in rows_of(here / "run" / "new_patient.csv")} == {"uniaxial", "planar"}
     assert "4 specimens, uniaxial, planar, " in (here / "run" / "report.html").read_text()
     specimens = rows_of(here / "run" / "specimens.csv")
     assert {row["unit"] for row in specimens} == {"kPa"}
     assert [float(row["median"]) for row in specimens] == pytest.approx([*MODULI_KPA[:3], 50], rel=0.05)
-    assert cli("population", "--config", "run/run.toml", "--no-figures", "--out", "again").status == 0
+    done("population", "--config", "run/run.toml", "--no-figures", "--out", "again")
     assert (here / "again" / "population.csv").read_bytes() == (here / "run" / "population.csv").read_bytes()
 
 
 @pytest.mark.slow
-def test_warnings_about_files_are_shown_with_their_specimens(cli, here):
+def test_warnings_about_files_are_shown_with_their_specimens(done, here):
     write_units(here)
-    said = cli("population", "S0.csv", "S1.csv", "S2.csv", "--discrepancy", "none", "--no-figures")
-    assert said.status == 0, said.err
+    said = done("population", "S0.csv", "S1.csv", "S2.csv", "--discrepancy", "none", "--no-figures")
     assert UNITS_ASSUMED in " ".join(said.out.split())
 
 
@@ -315,7 +309,7 @@ def write_covariates(folder, rows=(), name="covariates.csv"):
 
 
 @pytest.mark.slow
-def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
+def test_a_population_follows_covariates_and_a_new_patient_has_them(done, here):
     """The table lies among the specimens, of which it is none; a run is repeated with its copy."""
     write_all(here)
     write_covariates(here / "specimens")
@@ -329,8 +323,7 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
         *OPTIONS,
         "--no-figures",
     ]
-    said = cli("population", "specimens", *options, "--out", "run")
-    assert said.status == 0, said.err
+    said = done("population", "specimens", *options, "--out", "run")
     row, share = rows_of(here / "run" / "covariates.csv")
     slope = np.polyfit(AGES, np.log(MODULI_KPA), 1)[0]
     assert (row["kind"], row["per"], share["covariate"]) == ("factor", "per year", "all covariates")
@@ -440,7 +433,7 @@ def test_bad_input_ends_with_one_message(refused, here, arguments, words):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["biaxial", "simple-shear-normal"])
-def test_specimens_with_two_stresses_in_several_tests_of_one_table_are_a_population(cli, here, mode):
+def test_specimens_with_two_stresses_in_several_tests_of_one_table_are_a_population(done, here, mode):
     noise, rows = np.random.default_rng(3), []
     for k, modulus in enumerate(MODULI_KPA):
         for test, (x, y) in {"first": (0.3, 0.3), "second": (0.3, 0.0)}.items():
@@ -460,8 +453,7 @@ def test_specimens_with_two_stresses_in_several_tests_of_one_table_are_a_populat
     options = ["--specimen-column", "specimen", "--mode", mode, "--discrepancy", "none", "--noise-sd", 0.5]
     if mode != "biaxial":
         options += ["--column", "stress=shear stress [kPa]", "--column", "stress2=normal stress [kPa]"]
-    said = cli("population", "all.csv", *options, "--out", "run", "--no-figures")
-    assert said.status == 0, said.err
+    done("population", "all.csv", *options, "--out", "run", "--no-figures")
     found = {row["specimen"]: float(row["median"]) for row in rows_of(here / "run" / "specimens.csv")}
     for k, modulus in enumerate(MODULI_KPA):
         assert found[f"S{k}"] == pytest.approx(modulus, rel=0.02)  # sd of a C10: 0.5 kPa over the norm of 36 stresses

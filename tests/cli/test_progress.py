@@ -133,23 +133,22 @@ def test_the_time_left_is_that_of_the_tasks_so_far(monkeypatch, capsys):
     assert lines == [f"tissuq: {n + 1} of 4, {left} left, task {n}" for n, left in enumerate(times)]
 
 
-def test_verbose_tells_how_long_every_stage_took(cli, specimen, monkeypatch):
+def test_verbose_tells_how_long_every_stage_took(done, specimen, monkeypatch):
     monkeypatch.setattr(progress, "Timer", Endless)
-    said = cli("fit", specimen, *ALONE, "--verbose")
-    assert said.status == 0
+    said = done("fit", specimen, *ALONE, "--verbose")
     stages = re.findall(r"^tissuq: (.+): \d+\.\d s$", said.err, flags=re.MULTILINE)
     assert stages == ["none", "assessing", "writing"]
 
 
-def test_verbose_tells_how_long_reading_a_run_took(cli, specimen, monkeypatch):
+def test_verbose_tells_how_long_reading_a_run_took(cli, done, specimen, monkeypatch):
     monkeypatch.setattr(progress, "Timer", Endless)
-    assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
+    done("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run")
     assert re.fullmatch(r"tissuq: reading: \d+\.\d s\n", cli("show", "run", "--verbose").err)
     assert re.findall(r"tissuq: (\w+): \d+\.\d s\n", cli("compare", "run", "--verbose").err) == ["reading", "comparing"]
 
 
-def test_quiet_leaves_the_json_of_a_run_and_prints_the_numbers_of_a_comparison_alone(cli, specimen):
-    assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
+def test_quiet_leaves_the_json_of_a_run_and_prints_the_numbers_of_a_comparison_alone(cli, done, specimen):
+    done("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run")
     assert cli("show", "run", "--json", "--quiet").out == cli("show", "run", "--json").out
     loud, quiet = cli("compare", "run").out, cli("compare", "run", "-q")
     assert quiet.status == 0
@@ -157,8 +156,8 @@ def test_quiet_leaves_the_json_of_a_run_and_prints_the_numbers_of_a_comparison_a
     assert 0 < len(quiet.out.splitlines()) < len(loud.splitlines())
 
 
-def test_the_log_of_a_run_says_version_command_and_stages_and_nothing_of_the_machine(cli, here, specimen):
-    assert cli("fit", specimen.name, *ALONE).status == 0
+def test_the_log_of_a_run_says_version_command_and_stages_and_nothing_of_the_machine(done, here, specimen):
+    done("fit", specimen.name, *ALONE)
     text = (here / "runs" / "specimen" / LOG).read_text()
     assert re.search(r"UTC  tissuq \S+, Python \d", text)
     assert "command: tissuq fit specimen.csv --noise-sd 1 --discrepancy none --no-figures\n" in text
@@ -167,9 +166,9 @@ def test_the_log_of_a_run_says_version_command_and_stages_and_nothing_of_the_mac
         assert private not in text
 
 
-def test_the_log_is_of_the_run_and_goes_with_it_when_it_is_replaced(cli, here, specimen):
+def test_the_log_is_of_the_run_and_goes_with_it_when_it_is_replaced(done, here, specimen):
     for options in ((), ("--force",)):
-        assert cli("fit", specimen.name, *ALONE, *options).status == 0
+        done("fit", specimen.name, *ALONE, *options)
     assert (here / "runs" / "specimen" / LOG).read_text().count("command: ") == 1
 
 
@@ -184,8 +183,8 @@ def test_what_is_said_when_stopped_names_what_is_done_and_how_to_go_on(folder, m
     assert monitor.stopped() == wanted + "tissuq structure 'my run'"
 
 
-def test_quiet_prints_the_answer_of_a_ranking_alone(cli, here, specimen):
-    assert cli("fit", specimen, *ALONE, "--out", "run").status == 0
+def test_quiet_prints_the_answer_of_a_ranking_alone(cli, refused, done, here, specimen):
+    done("fit", specimen, *ALONE, "--out", "run")
     options = ("--candidate", "planar 1.05:1.2 6", "--no-figures")
     said = cli("design", "run", *options, "--quiet")
     assert (said.status, said.err) == (0, "")
@@ -194,9 +193,7 @@ def test_quiet_prints_the_answer_of_a_ranking_alone(cli, here, specimen):
     name, _, value = line.partition(": ")
     assert name in loud
     assert value in " ".join(loud.split())
-    wrong = cli("design", "nowhere", "--quiet")
-    assert wrong.status == 2
-    assert "no run folder" in wrong.err
+    refused(["no run folder"], "design", "nowhere", "--quiet")
 
 
 def test_quiet_prints_the_numbers_of_a_fit_alone(cli, here, specimen):

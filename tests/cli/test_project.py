@@ -19,31 +19,28 @@ def test_the_example_project_is_written_and_what_to_type_next_is_said(cli, here)
     assert (here / "brain/data/shear.csv").read_bytes() == datasets.path("brain-cortex-shear").read_bytes()
 
 
-def test_without_a_name_the_folder_is_tissuq_example(cli, here):
-    assert cli("init").status == 0
+def test_without_a_name_the_folder_is_tissuq_example(done, here):
+    done("init")
     assert [path.name for path in here.iterdir()] == ["tissuq-example"]
 
 
-def test_an_empty_folder_is_written_into(cli, here):
+def test_an_empty_folder_is_written_into(done, here):
     (here / "mine").mkdir()
-    assert cli("init", "mine").status == 0
+    done("init", "mine")
     assert (here / "mine" / "study.toml").exists()
 
 
 @pytest.mark.parametrize("place", ["folder", "file"])
-def test_what_is_there_is_left_alone(cli, here, place):
+def test_what_is_there_is_left_alone(refused, here, place):
     (here / "folder").mkdir()
     (here / "folder" / "mine.txt").write_text("mine")
     (here / "file").write_text("mine")
-    said = cli("init", place)
-    assert said.status == 2
-    assert f"'{place}'" in said.err
-    assert "tissuq init FOLDER" in said.err
+    refused([f"'{place}'", "tissuq init FOLDER"], "init", place)
     assert [path.name for path in (here / "folder").iterdir()] == ["mine.txt"]
 
 
 @pytest.mark.parametrize("is_there", [True, False])
-def test_a_project_that_cannot_be_finished_leaves_nothing(cli, here, monkeypatch, is_there):
+def test_a_project_that_cannot_be_finished_leaves_nothing(refused, here, monkeypatch, is_there):
     if is_there:
         (here / "brain").mkdir()
 
@@ -51,19 +48,16 @@ def test_a_project_that_cannot_be_finished_leaves_nothing(cli, here, monkeypatch
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", full)
-    said = cli("init", "brain")
-    assert said.status == 2
-    assert "No space left" in said.err
+    refused(["No space left"], "init", "brain")
     assert [path for path in here.rglob("*") if path != here / "brain"] == []
     assert (here / "brain").exists() == is_there
 
 
-def test_the_commands_of_the_example_work(cli, here, monkeypatch):
+def test_the_commands_of_the_example_work(cli, done, here, monkeypatch):
     cli("init", "brain")
     monkeypatch.chdir(here / "brain")
-    assert cli("inspect", "data/tension-compression.csv").status == 0
-    said = cli("fit", "study.toml", "--discrepancy", "none", "--no-figures")
-    assert said.status == 0, said.err
+    done("inspect", "data/tension-compression.csv")
+    said = done("fit", "study.toml", "--discrepancy", "none", "--no-figures")
     assert "Each test predicted from the others" in said.out
 
 

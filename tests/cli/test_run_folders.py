@@ -17,65 +17,62 @@ from .conftest import tree
 ALONE = ["--noise-sd", "1", "--discrepancy", "none", "--no-figures"]
 
 
-def test_an_existing_run_is_refused_without_force_and_left_as_it_was(cli, here, specimen):
-    assert cli("fit", specimen, *ALONE).status == 0
+def test_an_existing_run_is_refused_without_force_and_left_as_it_was(refused, done, here, specimen):
+    done("fit", specimen, *ALONE)
     before = tree(here)
-    said = cli("fit", specimen, *ALONE, "--seed", 9)
-    assert said.status == 2
-    assert "run folder 'runs/specimen' already exists" in said.err
-    assert "--force" in said.err
+    refused(["run folder 'runs/specimen' already exists", "--force"], "fit", specimen, *ALONE, "--seed", 9)
     assert tree(here) == before
 
 
-def test_an_existing_run_is_replaced_with_force(cli, here, specimen):
-    assert cli("fit", specimen, *ALONE).status == 0
-    assert cli("fit", specimen, *ALONE, "--seed", 9, "--force").status == 0
+def test_an_existing_run_is_replaced_with_force(done, here, specimen):
+    done("fit", specimen, *ALONE)
+    done("fit", specimen, *ALONE, "--seed", 9, "--force")
     assert "seed = 9" in (here / "runs" / "specimen" / "run.toml").read_text()
     assert [path.name for path in (here / "runs").iterdir()] == ["specimen"]
 
 
-def test_an_empty_folder_is_taken(cli, here, specimen):
+def test_an_empty_folder_is_taken(done, here, specimen):
     (here / "empty").mkdir()
-    assert cli("fit", specimen, *ALONE, "--out", "empty").status == 0
+    done("fit", specimen, *ALONE, "--out", "empty")
     assert (here / "empty" / "run.toml").exists()
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]], ids=["without force", "with force"])
 @pytest.mark.parametrize("name", ["thesis.docx", "run.toml", "summary.csv"])
 @pytest.mark.parametrize("command", ["fit", "paper"])
-def test_a_folder_of_other_files_is_never_touched(cli, here, specimen, command, name, force):
+def test_a_folder_of_other_files_is_never_touched(refused, here, specimen, command, name, force):
     (here / "mine").mkdir()
     (here / "mine" / name).write_text("mine")
     before = tree(here)
     options = [specimen, *ALONE] if command == "fit" else ["--no-figures"]
-    said = cli(command, *options, "--out", "mine", *force)
-    assert said.status == 2
-    assert "folder 'mine' contains files that are not a run" in said.err
+    refused(["folder 'mine' contains files that are not a run"], command, *options, "--out", "mine", *force)
     assert tree(here) == before
 
 
-def test_what_another_command_made_is_not_replaced_with_force(cli, here, specimen):
-    assert cli("fit", specimen, "--discrepancy", "none", "--no-figures", "--out", "run").status == 0
-    assert cli("export", "run", "--draws", 2, "--out", "made").status == 0
+def test_what_another_command_made_is_not_replaced_with_force(refused, done, here, specimen):
+    done("fit", specimen, "--discrepancy", "none", "--no-figures", "--out", "run")
+    done("export", "run", "--draws", 2, "--out", "made")
     before = sorted(path.name for path in (here / "made").iterdir())
     for command in (("fit", specimen, "--no-figures"), ("design", "run", "--no-figures")):
-        said = cli(*command, "--out", "made", "--force")
-        assert said.status == 2
-        assert f"holds what tissuq export made, which --force of tissuq {command[0]} does not replace" in said.err
+        refused(
+            [f"holds what tissuq export made, which --force of tissuq {command[0]} does not replace"],
+            *command,
+            "--out",
+            "made",
+            "--force",
+        )
     assert sorted(path.name for path in (here / "made").iterdir()) == before
-    assert cli("export", "run", "--draws", 3, "--out", "made", "--force").status == 0
+    done("export", "run", "--draws", 3, "--out", "made", "--force")
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png", "posterior/deep/er/mine.nc"])
-def test_files_that_someone_put_into_a_run_folder_are_not_deleted_by_force(cli, here, specimen, name):
-    assert cli("fit", specimen, *ALONE).status == 0
+def test_files_that_someone_put_into_a_run_folder_are_not_deleted_by_force(refused, done, here, specimen, name):
+    done("fit", specimen, *ALONE)
     mine = here / "runs" / "specimen" / name
     mine.parent.mkdir(parents=True, exist_ok=True)
     mine.write_text("mine")
     before = tree(here)
-    said = cli("fit", specimen, *ALONE, "--force")
-    assert said.status == 2
-    assert name in said.err
+    refused([name], "fit", specimen, *ALONE, "--force")
     assert tree(here) == before
 
 
@@ -96,11 +93,9 @@ def test_a_folder_that_cannot_be_made_is_refused_and_leaves_nothing(refused, spe
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
-def test_a_folder_without_permission_is_refused_before_the_work(cli, here, specimen):
+def test_a_folder_without_permission_is_refused_before_the_work(refused, here, specimen):
     (here / "locked").mkdir(mode=0o555)
-    said = cli("fit", specimen, *ALONE, "--out", "locked/run")
-    assert said.status == 2
-    assert "locked" in said.err
+    refused(["locked"], "fit", specimen, *ALONE, "--out", "locked/run")
 
 
 PARTS = "recipe", "csv", "json", "page"
@@ -118,14 +113,14 @@ def test_a_disk_that_is_full_at_any_step_leaves_nothing(refused, specimen, monke
     refused([message], "fit", specimen, *ALONE, "--out", "new/folder/run")
 
 
-def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(cli, refused, specimen, monkeypatch):
-    assert cli("fit", specimen, *ALONE).status == 0
+def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(done, refused, specimen, monkeypatch):
+    done("fit", specimen, *ALONE)
     monkeypatch.setattr("tissuq.report.writer.write_page", fail_for_want_of_space)
     refused(["No space left on device"], "fit", specimen, *ALONE, "--force")
 
 
-def test_the_earlier_run_is_put_back_when_the_new_one_cannot_take_its_place(cli, here, specimen, monkeypatch):
-    assert cli("fit", specimen, *ALONE).status == 0
+def test_the_earlier_run_is_put_back_when_the_new_one_cannot_take_its_place(cli, done, here, specimen, monkeypatch):
+    done("fit", specimen, *ALONE)
     before = tree(here)
     rename = type(here).rename
 
@@ -173,18 +168,18 @@ def test_a_full_standard_output_ends_without_a_traceback():
     assert "Traceback" not in done.stderr
 
 
-def test_a_run_through_a_link_to_a_folder_keeps_the_link(cli, here, specimen):
+def test_a_run_through_a_link_to_a_folder_keeps_the_link(done, here, specimen):
     (here / "real").mkdir()
     (here / "link").symlink_to("real")
-    assert cli("fit", specimen, *ALONE, "--out", "link").status == 0
-    assert cli("fit", specimen, *ALONE, "--out", "link", "--force").status == 0
+    done("fit", specimen, *ALONE, "--out", "link")
+    done("fit", specimen, *ALONE, "--out", "link", "--force")
     assert (here / "link").is_symlink()
     assert (here / "real" / "run.toml").exists()
 
 
-def test_a_run_is_repeated_into_its_own_folder_with_force(cli, here):
-    assert cli("fit", "rubber-treloar-uniaxial", *ALONE, "--out", "run").status == 0
-    assert cli("fit", "--config", "run/run.toml", "--no-figures", "--out", "run", "--force").status == 0
+def test_a_run_is_repeated_into_its_own_folder_with_force(done, here):
+    done("fit", "rubber-treloar-uniaxial", *ALONE, "--out", "run")
+    done("fit", "--config", "run/run.toml", "--no-figures", "--out", "run", "--force")
     copy = here / "run" / "input" / "rubber-treloar-uniaxial.csv"
     assert copy.read_bytes() == datasets.path("rubber-treloar-uniaxial").read_bytes()
 
@@ -218,13 +213,11 @@ def test_a_damaged_file_of_a_run_is_one_message(cli, here, fit_run, name, conten
     assert any(word in said.err for word in ("damaged", "not TOML"))
 
 
-def test_a_list_of_contents_that_is_no_text_is_no_reason_to_replace_a_run(cli, here, specimen):
+def test_a_list_of_contents_that_is_no_text_is_no_reason_to_replace_a_run(refused, done, here, specimen):
     options = ("--discrepancy", "none", "--no-figures", "--out", "run")
-    assert cli("fit", specimen, *options).status == 0
+    done("fit", specimen, *options)
     (here / "run" / "contents.txt").write_bytes(b"\xff\xfe\n")
-    said = cli("fit", specimen, *options, "--force")
-    assert said.status == 2
-    assert "also contains files that do not belong to the run" in said.err
+    refused(["also contains files that do not belong to the run"], "fit", specimen, *options, "--force")
 
 
 KILLED = """

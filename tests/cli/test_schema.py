@@ -25,10 +25,10 @@ def test_every_schema_is_one(name):
     jsonschema.Draft202012Validator.check_schema(schema_of(name))
 
 
-def test_a_recipe_keeps_to_the_schema_and_an_unknown_setting_does_not(cli, here, specimen):
+def test_a_recipe_keeps_to_the_schema_and_an_unknown_setting_does_not(done, here, specimen):
     import tomllib
 
-    assert cli("fit", specimen, "--noise-sd", 1, "--discrepancy", "none", "--no-figures").status == 0
+    done("fit", specimen, "--noise-sd", 1, "--discrepancy", "none", "--no-figures")
     recipe = tomllib.loads((here / "runs" / "specimen" / "run.toml").read_text())
     jsonschema.validate(recipe, schema_of("fit"))
     with pytest.raises(jsonschema.ValidationError, match="materail"):
@@ -44,7 +44,5 @@ def test_a_file_may_hold_more_than_the_command_line_says():
     assert schema_of("coverage")["required"] == ["designs"]
 
 
-def test_a_command_without_settings_has_no_schema(cli):
-    said = cli("schema", "modes")
-    assert said.status == 2
-    assert "'modes'" in said.err
+def test_a_command_without_settings_has_no_schema(refused):
+    refused(["'modes'"], "schema", "modes")

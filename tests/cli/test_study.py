@@ -27,20 +27,20 @@ def test_the_help_names_every_preset(cli):
 
 
 @pytest.mark.slow
-def test_the_settings_in_a_campaigns_folder_repeat_it(cli, here):
+def test_the_settings_in_a_campaigns_folder_repeat_it(done, here):
     (here / "small.toml").write_text(CAMPAIGN + "scale = [0.01, 10.0]\npredictive = true\nunseen = ['planar']\n")
-    assert cli("study", "coverage", "--config", "small.toml").status == 0
+    done("study", "coverage", "--config", "small.toml")
     first = here / "runs" / "coverage-small"
-    assert cli("study", "coverage", "--config", first / "run.toml", "--out", "again").status == 0
+    done("study", "coverage", "--config", first / "run.toml", "--out", "again")
     for name in ("tasks.jsonl", "summary.csv", "families.csv", "unseen.csv", "run.toml"):
         assert (first / name).read_bytes() == (here / "again" / name).read_bytes()
 
 
 @pytest.mark.slow
-def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
+def test_sbc_writes_its_table_and_page_and_goes_on(done, here):
     (here / "quick.toml").write_text('formulations = ["none", "zero-modulus"]\nreplicates = 20\n')
     arguments = ("study", "sbc", "--config", "quick.toml", "--noise", "known", "--out", "out")
-    assert cli(*arguments).status == 0
+    done(*arguments)
     tasks = (here / "out" / "tasks.jsonl").read_bytes()
     rows = rows_of(here / "out" / "ranks.csv")
     assert [(row["formulation"], row["parameter"]) for row in rows] == [
@@ -49,8 +49,7 @@ def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert all(f"{float(row['spread']):.3f}" in page for row in rows)
     (here / "out" / "tasks.jsonl").write_bytes(tasks[:100])
-    said = cli(*arguments)
-    assert said.status == 0
+    said = done(*arguments)
     assert "zero-modulus" in said.out
     assert (here / "out" / "tasks.jsonl").read_bytes() == tasks
 
@@ -76,15 +75,14 @@ def test_a_campaign_shows_progress_and_time_left_on_a_terminal(here):
 
 
 @pytest.mark.slow
-def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, here):
+def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, done, here):
     arguments = ("study", "tissues", "--dataset", "brain-cortex", "--formulation", "none", "--protocol", "tests")
-    said = cli(*arguments, "--out", "out")
-    assert said.status == 0
+    said = done(*arguments, "--out", "out")
     assert "Do predictions of real tests hold?" in said.out
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "Each test from the others of its set" in page
     assert {"summary.csv", "predictions.csv", "run.toml"} <= {file.name for file in (here / "out").iterdir()}
-    assert cli("study", "tissues", "--config", here / "out" / "run.toml", "--out", "out").status == 0
+    done("study", "tissues", "--config", here / "out" / "run.toml", "--out", "out")
     refused = cli(*arguments, "--protocol", "test", "--out", "other")
     assert refused.status == 2
     assert "there is no protocol 'test'; choose from tests, modes, specimens, ends, halves" in " ".join(
@@ -97,11 +95,10 @@ def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, h
 
 
 @pytest.mark.finite_elements
-def test_structures_write_bands_and_go_on(cli, here):
+def test_structures_write_bands_and_go_on(done, here):
     small = ["--replicates", 2, "--truth", "gent", "--structure", "bar", "--draws", 8, "--full-runs", 4, "--steps", 1]
     arguments = ("study", "structures", *small, "--measurements", 8, "--out", "out")
-    said = cli(*arguments)
-    assert said.status == 0, said.err
+    done(*arguments)
     tasks = (here / "out" / "tasks.jsonl").read_bytes()
     rows = rows_of(here / "out" / "bands.csv")
     assert [(row["truth"], row["tests"], row["structure"]) for row in rows] == [
@@ -115,7 +112,7 @@ def test_structures_write_bands_and_go_on(cli, here):
     inside = [float(row["default_low"]) <= float(row["force_N"]) <= float(row["default_high"]) for row in rows]
     assert float(summary["inside"]) == pytest.approx(sum(inside) / 2)
     (here / "out" / "tasks.jsonl").write_bytes(tasks[: tasks.index(b"\n") + 20])
-    assert cli(*arguments).status == 0
+    done(*arguments)
     assert (here / "out" / "tasks.jsonl").read_bytes() == tasks
 
 
@@ -125,8 +122,6 @@ def test_structures_write_bands_and_go_on(cli, here):
      (["--mode", "biaxial"], "several controls"), (["--mode", "simple-shear-normal"], "or stresses"),
      (["--estimand", "all"], "estimand")],
 )  # fmt: skip
-def test_structures_that_are_not_known_are_refused(cli, here, more, words):
-    said = cli("study", "structures", *more)
-    assert said.status == 2
-    assert words in said.err
+def test_structures_that_are_not_known_are_refused(refused, here, more, words):
+    refused([words], "study", "structures", *more)
     assert not (here / "runs").exists()

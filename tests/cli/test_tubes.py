@@ -20,12 +20,11 @@ SIZES = ["--diameter", "3 mm", "--thickness", "0.25 mm"]
         (fibres, "neo-hookean+exponential-fibres@45", {"C10": 20, "k1": 10, "k2": 1}),
     ],
 )
-def test_the_parameters_of_a_simulated_vessel_are_within_their_intervals(cli, here, law, material, truth):
+def test_the_parameters_of_a_simulated_vessel_are_within_their_intervals(done, here, law, material, truth):
     """With noise of 1 %, of one seed: of twenty draws of the noise an interval misses its parameter in one."""
     written(here, rows_of(law, noise=0.01, seed=1))
     alone = ["--discrepancy", "none", "--estimand", "as-tested", "--no-figures"]
-    said = cli("fit", "artery.csv", *SIZES, "--material", material, *alone, "--out", "run")
-    assert said.status == 0, said.err
+    done("fit", "artery.csv", *SIZES, "--material", material, *alone, "--out", "run")
     with (here / "run" / "parameters.csv").open(newline="") as lines:
         rows = {row["parameter"]: row for row in csv.DictReader(lines)}
     for name, value in truth.items():

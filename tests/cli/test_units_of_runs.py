@@ -12,9 +12,8 @@ from .conftest import rows_of
 
 
 @pytest.fixture
-def run(cli, here, specimen):
-    said = cli("fit", specimen, "--discrepancy", "none", "--prior", "C10=normal(40,30)", "--no-figures", "--out", "run")
-    assert said.status == 0, said.err
+def run(done, here, specimen):
+    done("fit", specimen, "--discrepancy", "none", "--prior", "C10=normal(40,30)", "--no-figures", "--out", "run")
     return here / "run"
 
 
@@ -31,21 +30,19 @@ def test_tables_of_a_run_are_in_the_unit_of_the_file(run):
 
 
 @pytest.fixture
-def soft(cli, here, specimen):
+def soft(done, here, specimen):
     """The same measurements in MPa, the largest of which is 0.05, with noise and prior in MPa, too."""
     data = tq.read(specimen, unit="kPa")
     rows = "".join(f"{x!r},{y!r}\n" for x, y in zip(data.stretch.tolist(), data.stress.tolist(), strict=True))
     (here / "soft.csv").write_text(f"stretch,stress_MPa\n{rows}", encoding="utf-8")
     options = ["--discrepancy", "none", "--noise-sd", 1e-3, "--prior", "C10=normal(0.04,0.03)", "--no-figures"]
-    said = cli("fit", "soft.csv", *options, "--out", "soft")
-    assert said.status == 0, said.err
+    said = done("fit", "soft.csv", *options, "--out", "soft")
     return here / "soft", said.out
 
 
-def test_small_stresses_in_mpa_are_shown_in_kpa_and_typed_in_mpa(cli, here, specimen, soft):
+def test_small_stresses_in_mpa_are_shown_in_kpa_and_typed_in_mpa(cli, done, here, specimen, soft):
     options = ["--discrepancy", "none", "--noise-sd", 1, "--prior", "C10=normal(40,30)", "--no-figures"]
-    said = cli("fit", specimen, *options, "--out", "kpa")
-    assert said.status == 0, said.err
+    said = done("fit", specimen, *options, "--out", "kpa")
     folder, printed = soft
     answer = [line for line in printed.splitlines() if " C10 " in line]
     assert answer == [line for line in said.out.splitlines() if " C10 " in line]
@@ -66,13 +63,11 @@ def test_the_data_of_a_run_are_read_back_with_their_unit(run, specimen):
     assert of_run.stress == pytest.approx(data.stress, rel=1e-12)
 
 
-def test_a_run_of_an_earlier_version_says_how_to_make_it_again(cli, run):
+def test_a_run_of_an_earlier_version_says_how_to_make_it_again(cli, refused, done, run):
     shown = cli("show", run)
     (run / "result.json").unlink()
-    said = cli("show", run)
-    assert said.status == 2
-    assert "result.json is missing. If an earlier version made it, make it again, as the first line of" in said.err
+    refused(["result.json is missing. If an earlier version made it, make it again, as the first line of"], "show", run)
     first = (run / "run.toml").read_text(encoding="utf-8").splitlines()[0]
     words = first.partition("tissuq ")[2].replace("run.toml", str(run / "run.toml")).replace("ANOTHER_FOLDER", "again")
-    assert cli(*words.split()).status == 0
+    done(*words.split())
     assert cli("show", "again").out.split() == shown.out.replace(str(run), "again").split()

@@ -29,9 +29,8 @@ def laws_in(folder):
 
 
 @pytest.mark.slow
-def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
-    said = cli("fit", specimen, *TWO, *ALONE, "--out", "two")
-    assert said.status == 0, said.err
+def test_two_laws_are_compared_and_one_is_gone_on_with(cli, done, here, specimen):
+    said = done("fit", specimen, *TWO, *ALONE, "--out", "two")
     words = " ".join(said.out.split())
     assert "Laws of specimen, moduli in kPa" in words
     assert "The initial shear modulus, averaged over the laws, has the mean" in words
@@ -47,10 +46,9 @@ def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
     page = (here / "two" / "report.html").read_text()
     assert page.count("<svg") + page.count("data:image/svg+xml") == 2
     for number, option in enumerate(("--material", "--discrepancy")):  # the other one is its former name
-        predicted = cli(
+        predicted = done(
             "predict", "two", option, "mooney-rivlin", "--mode", "planar", "--no-figures", "--out", f"p{number}"
         )
-        assert predicted.status == 0, predicted.err
         assert f"tissuq predict two {option} mooney-rivlin --mode planar --data" in " ".join(predicted.out.split())
     assert (here / "p0" / "prediction.csv").read_bytes() == (here / "p1" / "prediction.csv").read_bytes()
     again = cli("predict", "--config", "p0/run.toml", "--no-figures", "--out", "again")
@@ -65,30 +63,28 @@ def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
     ):
         refused = cli("predict", "two", *options, "--mode", "planar", "--no-figures")
         assert (refused.status, words in refused.err) == (2, True)
-    exported = cli("export", "two", "--material", "neo-hookean", "--draws", 2, "--format", "abaqus")
-    assert exported.status == 0, exported.err
+    done("export", "two", "--material", "neo-hookean", "--draws", 2, "--format", "abaqus")
     asked = cli("predict", "two", "--mode", "planar", "--no-figures", "--out", "other")
     assert (asked.status, asked.err.count("\n")) == (2, 1)
     assert "has several laws: choose one of mooney-rivlin, neo-hookean" in asked.err
 
 
 @pytest.mark.slow
-def test_a_comparison_is_repeated_from_its_recipe(cli, here, specimen):
-    assert cli("fit", specimen, *TWO, *ALONE, "--no-figures", "--out", "first").status == 0
+def test_a_comparison_is_repeated_from_its_recipe(done, here, specimen):
+    done("fit", specimen, *TWO, *ALONE, "--no-figures", "--out", "first")
     recipe = tomllib.loads((here / "first" / "run.toml").read_text())
     assert recipe["laws"] == ["neo-hookean", "mooney-rivlin"]
     assert "material" not in recipe
-    assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "again").status == 0
+    done("fit", "--config", "first/run.toml", "--no-figures", "--out", "again")
     first, again = (laws_in(here / folder) for folder in ("first", "again"))
     for name, row in first.items():
         assert row | {"seconds": ""} == again[name] | {"seconds": ""}
 
 
 @pytest.mark.slow
-def test_laws_that_are_divided_among_processes_are_written_alike(cli, here, specimen):
+def test_laws_that_are_divided_among_processes_are_written_alike(done, here, specimen):
     for workers in (1, 2):
-        said = cli("fit", specimen, *TWO, *ALONE, "--no-figures", "--workers", workers, "--out", str(workers))
-        assert said.status == 0, said.err
+        done("fit", specimen, *TWO, *ALONE, "--no-figures", "--workers", workers, "--out", str(workers))
     one, two = (laws_in(here / folder) for folder in ("1", "2"))
     assert [row | {"seconds": ""} for row in one.values()] == [row | {"seconds": ""} for row in two.values()]
 
@@ -107,27 +103,24 @@ def test_a_process_that_is_ended_from_outside_is_one_message(cli, here, specimen
 
 
 @pytest.mark.slow
-def test_a_law_of_ones_own_takes_part(cli, here, specimen):
+def test_a_law_of_ones_own_takes_part(cli, done, here, specimen):
     (here / "law.py").write_text(LAW)
-    said = cli("fit", specimen, "--material", "law.py:softening", "--material", "neo-hookean", *ALONE, "--no-figures")
-    assert said.status == 0, said.err
+    done("fit", specimen, "--material", "law.py:softening", "--material", "neo-hookean", *ALONE, "--no-figures")
     folder = here / "runs" / "specimen"
     assert set(laws_in(folder)) == {"softening", "neo-hookean"}
     assert (folder / "input" / "law.py").read_text() == LAW
     options = ("--mode", "planar", "--no-figures", "--out")
     for number, named in enumerate((["--user-law", "law.py:softening"], ["--material", "law.py:softening"])):
-        predicted = cli("predict", "runs/specimen", *named, *options, f"p{number}")
-        assert predicted.status == 0, predicted.err
+        predicted = done("predict", "runs/specimen", *named, *options, f"p{number}")
         assert "softening" in predicted.out
     two = ["--material", "neo-hookean", "--user-law", "law.py:softening"]
     refused = cli("predict", "runs/specimen", *two, *options, "p2")
     assert (refused.status, "give one law" in refused.err) == (2, True)
 
 
-def test_a_law_in_a_class_of_ones_own_is_fitted_where_it_is_known(cli, here, specimen):
+def test_a_law_in_a_class_of_ones_own_is_fitted_where_it_is_known(done, here, specimen):
     (here / "laws.py").write_text(f"from tissuq import Material, Parameter\n\n\n{SIMPLE}")
-    said = cli("fit", specimen, "--material", "laws.py:Simple", *TWO, *ALONE, "--workers", 2, "--no-figures")
-    assert said.status == 0, said.err
+    done("fit", specimen, "--material", "laws.py:Simple", *TWO, *ALONE, "--workers", 2, "--no-figures")
     assert len(laws_in(here / "runs" / "specimen")) == 3
 
 

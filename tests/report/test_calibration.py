@@ -43,11 +43,11 @@ def study(
     calibration = SimpleNamespace(
         problem=problem, marginals=marginals, converged=is_sure, emulator_share={"mu": share, "b": 0.0},
         predict=lambda noise, discrepancy: bands[discrepancy],
-        predictive_coverage=lambda discrepancy=True: inside if discrepancy else alone,
+        predictive_coverage=lambda discrepancy=True: inside if discrepancy else alone, warnings=list(warnings),
     )  # fmt: skip
     measured = SimpleNamespace(control=DEPTH)
     return SimpleNamespace(
-        calibration=calibration, posterior=None, warnings=list(warnings), units={}, data={"": measured},
+        calibration=calibration, posterior=None, units={}, data={"": measured},
         settings=SimpleNamespace(zero_load=0.0),
     )  # fmt: skip
 

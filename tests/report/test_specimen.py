@@ -126,9 +126,9 @@ def test_discrepancies_beyond_the_interval_of_the_answer_are_named_with_what_the
     means = {"auto": modulus.mean, "near": 0.9 * high + 0.1 * low, "above": 1.1 * high, "below": 0.9 * low}
     monkeypatch.setattr(specimen, "shares_of_discrepancy", lambda solution: (None, (solution, 0.0, 0.0)))
     for changes, reason in ((-0.2, " (they change the initial stiffness)"), (0.01, "")):
-        fits = {name: SimpleNamespace(marginals={"C10": SimpleNamespace(mean=mean, hdi=modulus.hdi)}, solution=share)
+        fits = {name: SimpleNamespace(marginals={"C10": SimpleNamespace(mean=mean, hdi=modulus.hdi)}, solution=share,
+                                      warnings=())
                 for (name, mean), share in zip(means.items(), (0.0, 0.0, 0.3, changes), strict=True)}  # fmt: skip
-        study = SimpleNamespace(posteriors=fits, main="auto", headline="C10", unit=specimen_study.unit,
-                                is_cut_by_prior=lambda name: False)  # fmt: skip
+        study = SimpleNamespace(posteriors=fits, main="auto", headline="C10", unit=specimen_study.unit)
         (number,) = specimen._over_discrepancies(study)
         assert number.remark == f"the answer is that of auto; beyond its interval: above, below{reason}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -155,7 +155,7 @@ class Call(Generic[Kind, How]):
         if source and self.config:
             raise InputError(
                 f"'{self.config}' is of a {earlier}, and names what that is of: leave out --config, or {what} "
-                f"({_shown(source)})."
+                f"({' '.join(map(str, source if isinstance(source, list) else [source]))})."
             )
         if not (source or self.config):
             raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
@@ -239,7 +239,7 @@ class Call(Generic[Kind, How]):
                 result = result_of(study)
                 record = write_result(result, folder, figures=self.how.figures, target=target)
                 self.monitor.write_log(folder, result.warnings)
-        self._show(record, target)
+        self.show(record, target)
         return study
 
     def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
@@ -248,24 +248,16 @@ class Call(Generic[Kind, How]):
 
         record = write_result(result, folder, figures=figures)
         self.monitor.write_log(folder, result.warnings)
-        self._show(record, folder)
+        self.show(record, folder)
 
-    def _show(self, record: Record, folder: Path) -> None:
+    def show(self, record: Record, folder: Path | None, *, details: bool = False) -> None:
+        """Print the record of a result; of that with --quiet, which leaves all else out, the numbers."""
         from tissuq.report.terminal import print_result
 
-        print_result(record, folder)
-        self.answer(record["numbers"])
-
-    def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:
-        """Print the numbers of a result, with --quiet alone, which leaves all else out."""
-        for number in numbers if self.monitor.is_quiet else ():
+        print_result(record, folder, details=details)
+        for number in record["numbers"] if self.monitor.is_quiet else ():
             remark = f", {number['remark']}" if number["remark"] else ""
             print(f"{number['name'].removesuffix(':')}: {number['text']}{remark}", file=self.out)
-
-
-def _shown(files: Any) -> str:
-    """Return a file, or several, as they were typed."""
-    return " ".join(map(str, files)) if isinstance(files, list | tuple) else str(files)
 
 
 def not_converged(names: list[str]) -> None:
@@ -293,6 +285,8 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
     InputError
         When it is neither.
     """
+    import tomllib
+
     from tissuq.studies.stream import unfinished
 
     recipe = folder / RECIPE
@@ -302,9 +296,10 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
         return
     if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    stored, wanted = _without(recipe.read_text(encoding="utf-8"), free), _without(_recipe(settings), free)
-    if stored != wanted:
-        names = [name for name in {**stored, **wanted} if stored.get(name) != wanted.get(name)]
+    stored, wanted = dict[str, Any](), _plain(settings)
+    with suppress(tomllib.TOMLDecodeError):  # a damaged one has no settings
+        stored = tomllib.loads(recipe.read_text(encoding="utf-8"))
+    if names := [name for name in {**stored, **wanted} if name not in free and stored.get(name) != wanted.get(name)]:
         said = ", ".join(f"{name}: {stored.get(name, 'none')} there, {wanted.get(name, 'none')} here" for name in names)
         raise InputError(
             f"'{folder}' holds a campaign with other settings ({said:.{MAX_LETTERS}}): choose another folder (--out)."
@@ -313,23 +308,14 @@ def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = froze
 
 def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
     """Write the recipe atomically, so that a killed campaign can be resumed."""
+    import tomli_w
+
     from tissuq.studies.stream import write_whole
 
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / RECIPE, _recipe(settings))
+    write_whole(folder / RECIPE, tomli_w.dumps(_plain(settings)))
 
 
-def _without(recipe: str, names: frozenset[str]) -> dict[str, Any]:
-    """Return the settings of a recipe without some of them, none where it is damaged."""
-    import tomllib
-
-    try:
-        return {name: value for name, value in tomllib.loads(recipe).items() if name not in names}
-    except tomllib.TOMLDecodeError:
-        return {}
-
-
-def _recipe(settings: BaseModel) -> str:
-    import tomli_w
-
-    return tomli_w.dumps(settings.model_dump(mode="json", exclude_none=True))
+def _plain(settings: BaseModel) -> dict[str, Any]:
+    """Return settings as a recipe has them."""
+    return settings.model_dump(mode="json", exclude_none=True)

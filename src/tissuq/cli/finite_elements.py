@@ -17,9 +17,6 @@ from tissuq.studies.option_texts import once_each
 if TYPE_CHECKING:
     from tissuq.studies.ensemble import PreparedEnsemble
 
-FINER_MESH = "finer-mesh"
-"""What the copy of a finer mesh is called."""
-
 
 class StructureOptions(LawOfRun, Configured):
     """How a simulation is carried out."""
@@ -35,7 +32,7 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     """Compute the force in a case with draws of a posterior; the same command resumes a stopped simulation."""
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import simulation_result
-    from tissuq.report.source_run import SOURCE, check_mesh, check_source, copy_mesh, copy_source, stored_mesh
+    from tissuq.report.source_run import SOURCE, check_mesh, check_source, copy_source, mesh_files
     from tissuq.report.terminal import print_warnings
     from tissuq.studies.stream import open_pool
     from tissuq.studies.structure import load_posteriors, run_simulation
@@ -44,9 +41,9 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     settings, beside, law = call.settings, call.beside, call.law
     source = beside / settings.run
     case = settings.sized_case(beside)
-    finer = settings.finer_case(beside)
-    stored = {"mesh": stored_mesh(settings.mesh), "finer_mesh": stored_mesh(settings.finer_mesh, FINER_MESH)}
-    stored_settings = settings.model_copy(update={"run": SOURCE, **stored})
+    meshes = mesh_files(case, settings.finer_case(beside))
+    stored_meshes = {setting: name for setting, (name, _) in meshes.items()}
+    stored_settings = settings.model_copy(update={"run": SOURCE, **stored_meshes})
     named = Path(settings.mesh).stem if settings.mesh else case.name
     of_run = beside if call.config else Path(settings.run)
     folder = call.how.out or Path("runs") / f"{of_run.resolve().name}-{named}"
@@ -54,7 +51,8 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
         check_apart(folder, source)
     check_folder(folder, stored_settings, free=frozenset({"finer_mesh", "mesh_order"}))
     check_source(source, folder)
-    check_mesh(case, folder)
+    if "mesh" in meshes:
+        check_mesh(*meshes["mesh"], folder)
     with call.monitor.steps() as step, warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always", UserWarning)
         posteriors = load_posteriors(settings, beside, law, step)
@@ -62,8 +60,8 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     def prepare() -> None:
         write_campaign_recipe(folder, stored_settings)
         copy_source(source, folder)
-        copy_mesh(case, folder)
-        copy_mesh(finer, folder, FINER_MESH)
+        for name, content in meshes.values():
+            (folder / name).write_bytes(content)
 
     processes = 1 if law else call.how.workers or os.cpu_count() or 1  # others cannot load a law from a file
     campaign = call.campaign_in(folder)

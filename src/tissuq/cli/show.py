@@ -36,7 +36,6 @@ class ShowOptions(Verbosity):
 @command(ShownRun, ShowOptions)
 def show(call: Call[ShownRun, ShowOptions]) -> None:
     """Print the answer of a run and where its report lies."""
-    from tissuq.report.terminal import print_result
     from tissuq.report.writer import contents_for_programs, read_record
 
     folder = call.settings.run_folder
@@ -51,8 +50,7 @@ def show(call: Call[ShownRun, ShowOptions]) -> None:
         with call.monitor.steps() as step:
             step("reading")
             record = read_record(folder)
-        print_result(record, folder, details=call.how.details)
-        call.answer(record["numbers"])
+        call.show(record, folder, details=call.how.details)
 
 
 def write_pdf(page: Path, file: Path) -> None:
@@ -118,7 +116,6 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     from tissuq.experiments.units import stress_unit
     from tissuq.report.comparison import comparison_result
     from tissuq.report.run_folder import run_folder
-    from tissuq.report.terminal import print_result
     from tissuq.report.writer import write_result
 
     runs, out, force = call.settings.runs, call.how.out, call.how.force
@@ -138,9 +135,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     if out is not None:
         with run_folder(out, call.command, force=force) as folder:
             write_result(result, folder, target=out)
-    record = result.record()
-    print_result(record, out, details=out is None)
-    call.answer(record["numbers"])
+    call.show(result.record(), out, details=out is None)
 
 
 def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:

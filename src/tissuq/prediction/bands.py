@@ -146,6 +146,10 @@ class Band:
     low: FloatArray
     high: FloatArray
 
+    def at(self, rows: Any) -> Band:
+        """Return it at some of the stretches: their numbers, a slice, or whether it is each."""
+        return Band(*(values[rows] for values in vars(self).values()))
+
 
 def predict_band(
     solution: Solution,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -80,9 +80,9 @@ class Bands:
         return self.table[self.table["draws"] > 1]
 
     @cached_property
-    def last(self) -> dict[str, Any]:
+    def last(self) -> Mapping[Any, Any]:
         """The last of these."""
-        return {str(key): value for key, value in self.of_several.iloc[-1].items()}
+        return self.of_several.iloc[-1].to_dict()
 
     @property
     def is_mesh_free(self) -> bool:
@@ -141,7 +141,7 @@ class Bands:
         labels = [LABELS[name] for name in shares]
         return [along, "draws", mean, "sd", percent, *labels, *without, *["on this mesh"] * self.is_mesh_free]
 
-    def cells(self, row: dict[str, Any], along: str, shares: Sequence[str]) -> list[str]:
+    def cells(self, row: Mapping[Any, Any], along: str, shares: Sequence[str]) -> list[str]:
         """Return a row in words: along what, number of draws, band, shares, and what else there is of it."""
         cells = [along, str(int(row["draws"])), *self.band(row), *(_share_cell(row, name) for name in shares)]
         if "without_mean" in row:
@@ -149,7 +149,7 @@ class Bands:
             cells += [mean, ends]
         return [*cells, *[significant(row["mean"] * self.factor)] * self.is_mesh_free]
 
-    def band(self, row: dict[str, Any], prefix: str | None = None) -> list[str]:
+    def band(self, row: Mapping[Any, Any], prefix: str | None = None) -> list[str]:
         """Return mean, standard deviation and ends of a band in words; of one of the mesh for cells without size."""
         factor = self.factor * (1.0 if prefix is None else self.mesh_ratio(row))
         prefix = self.prefix if prefix is None else prefix
@@ -159,7 +159,7 @@ class Bands:
         return [mean, sd, f"{low} to {high}"]
 
 
-def _share_cell(row: dict[str, Any], name: str) -> str:
+def _share_cell(row: Mapping[Any, Any], name: str) -> str:
     """Return the share of the variance that is due to a source, with its standard error.
 
     Of few draws the estimate, or one error beside it, may lie below 0 or above 100 %: then a range within these stands,

@@ -106,7 +106,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
         ),
         tables=(_parameters(study),),
         sections=(*_sections(study), methods_of_calibration(study, numbers)),
-        warnings=tuple(study.warnings),
+        warnings=tuple(calibration.warnings),
         files=files,
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip

@@ -54,13 +54,11 @@ def names_of(study: CalibrationStudy) -> str:
 
 def _reason_against(study: CalibrationStudy) -> str:
     """Return what stands against any use of the parameters; nothing where nothing does."""
-    share = _share_of_emulator(study)
-    bounded, without_effect = (
-        ", ".join(symbols_in(study.warnings, code)) for code in ("prior-bound", "poorly-determined")
-    )
+    share, warnings = _share_of_emulator(study), study.calibration.warnings
+    bounded, without_effect = (", ".join(symbols_in(warnings, code)) for code in ("prior-bound", "poorly-determined"))
     reasons = {
         "sampling has not converged": not study.calibration.converged,
-        "no parameters that the priors allow give the measurements": has_code(study.warnings, "unmodelled-curve"),
+        "no parameters that the priors allow give the measurements": has_code(warnings, "unmodelled-curve"),
         f"the model hardly depends on {without_effect}": bool(without_effect),
         f"a bound of its prior, not the data, determines {bounded}": bool(bounded),
         "the discrepancy takes initial stiffness from the parameters, so that intervals often miss them": (
@@ -103,7 +101,7 @@ def _reporting(study: CalibrationStudy) -> tuple[Verdict, str]:
     if share > LARGE_SHARE:
         verdict = worst_of(verdict, Verdict.CARE)
         width += f"; up to {100 * share:.0f} % of the variance is the error of the emulator"
-    elif any(w.code == "inaccurate-emulator" and w.severity is not Severity.NOTE for w in study.warnings):
+    elif any(w.code == "inaccurate-emulator" and w.severity is not Severity.NOTE for w in calibration.warnings):
         verdict, width = worst_of(verdict, Verdict.CARE), f"{width}; see the warning about the emulator"
     if isinstance(calibration.problem.discrepancy, NoDiscrepancy):
         return worst_of(verdict, Verdict.CARE), f"{width}, {IF_RIGHT}"
@@ -117,7 +115,7 @@ def _predicting(study: CalibrationStudy) -> tuple[Verdict, str]:
         return Verdict.NO, "sampling has not converged"
     inside = calibration.predictive_coverage()
     counts = f"{100 * inside:.0f} % of the measurements inside the band"
-    if inside < MIN_INSIDE or has_code(study.warnings, "unmodelled-curve"):
+    if inside < MIN_INSIDE or has_code(calibration.warnings, "unmodelled-curve"):
         return Verdict.NO, f"only {counts}" if inside < MIN_INSIDE else "the model does not give the measurements"
     verdict, width = precision_of(_half_width(calibration, discrepancy=True))
     return verdict, f"{width} on average where it was measured; {counts}"
@@ -126,11 +124,8 @@ def _predicting(study: CalibrationStudy) -> tuple[Verdict, str]:
 def _half_width(calibration: Calibration, *, discrepancy: bool) -> float:
     """Return the half width of the band over its middle where it was measured, of the quantity with the widest one."""
     table = calibration.predict(noise=False, discrepancy=discrepancy)
-    control, *ends = (table[name].to_numpy() for name in ("control", "mean", "low", "high"))
-    return max(
-        relative_half_width(Band(control[start:stop], *(end[start:stop] for end in ends)))
-        for start, stop in calibration.problem.quantities.values()
-    )
+    band = Band(*(table[name].to_numpy() for name in ("control", "mean", "low", "high")))
+    return max(relative_half_width(band.at(slice(*ends))) for ends in calibration.problem.quantities.values())
 
 
 def _of_model_alone(use: Use, study: CalibrationStudy) -> Use:
@@ -151,7 +146,7 @@ def _of_model_alone(use: Use, study: CalibrationStudy) -> Use:
 
 def finding_of(study: CalibrationStudy) -> str:
     """Return what the numbers are, and how much of their intervals the emulator makes."""
-    if has_code(study.warnings, "unmodelled-curve"):
+    if has_code(study.calibration.warnings, "unmodelled-curve"):
         return f"Not to be used: {NO_PARAMETERS_FIT}, and the intervals are of those that are least far from them."
     share = _share_of_emulator(study)
     size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
@@ -164,13 +159,13 @@ def finding_of(study: CalibrationStudy) -> str:
 def next_step_of(study: CalibrationStudy, uses: Sequence[Use]) -> str:
     """Return what to do next, given `uses_of_calibration`: what stands against the use of the parameters first."""
     calibration = study.calibration
-    if has_code(study.warnings, "unmodelled-curve"):
+    if has_code(calibration.warnings, "unmodelled-curve"):
         return "check units and signs of data and model (--unit, --factor), and the priors: no parameters fit the data."
     if not calibration.converged:
         return "make the posterior converge: repeat the command with --method nuts --force, or narrower priors."
-    if has_code(study.warnings, "poorly-determined"):
+    if has_code(calibration.warnings, "poorly-determined"):
         return "see whether the model reads the parameters that it hardly depends on, as the warning says."
-    if bounded := ", ".join(symbols_in(study.warnings, "prior-bound")):
+    if bounded := ", ".join(symbols_in(calibration.warnings, "prior-bound")):
         return f"give {bounded} a wider --prior, and repeat the command with --force; keep a bound that nature sets."
     if _share_of_emulator(study) > LARGE_SHARE:
         return "make the emulator more accurate where the posterior is: repeat the command with --refine 20 --force."

@@ -37,10 +37,18 @@ NODES, MAX_ERROR = 9, 0.01
 """Values of an exponent at which the material's curves are known, and error of these between them over the largest."""
 
 
+class _Bands(NamedTuple):
+    """Bands of new measurements and of the stress, with the discrepancy and without where there is one."""
+
+    measurements: Band
+    stress: Band
+    alone: Band | None
+
+
 class _Test(NamedTuple):
     """A stress to draw: its name, mode, channel, points (g,) or (g, c) along one path, and the measurements, MPa.
 
-    After them the number of the control that it is drawn against.
+    After them the number of the control that it is drawn against, and the bands, unless a posterior says nothing of it.
     """
 
     name: str
@@ -52,18 +60,11 @@ class _Test(NamedTuple):
     control: int = 0
     is_curve: bool = True
     is_back: BoolArray = np.zeros(0, dtype=bool)
+    bands: _Bands | None = None
 
     @property
     def abscissa(self) -> FloatArray:
         return values_of_control(self.points, self.control)
-
-
-class _Bands(NamedTuple):
-    """Bands of new measurements and of the stress, with the discrepancy and without where there is one."""
-
-    measurements: Band
-    stress: Band
-    alone: Band | None
 
 
 def chart_data(
@@ -98,16 +99,16 @@ def chart_data(
     posterior = posteriors[main]
     drawn = {name: list(_measured(described[name])) for name in sorted(posteriors, key=lambda name: name != main)}
     drawn[main] += _others(posterior)
-    sliders = _Sliders(posterior, [test for test, _ in drawn[main]], unit)
+    sliders = _Sliders(posterior, drawn[main], unit)
     views = [
-        {"formulation": name, "test": number, **_columns(bands, test, unit)}
+        {"formulation": name, "test": number, **_columns(test.bands, test, unit)}
         for name, tests in drawn.items()
-        for number, (test, bands) in enumerate(tests)
-        if bands is not None
+        for number, test in enumerate(tests)
+        if test.bands is not None
     ]
     return {
         "unit": unit.name,
-        "tests": [_test(test, sliders.basis(test), unit) for test, _ in drawn[main]],
+        "tests": [_test(test, sliders.basis(test), unit) for test in drawn[main]],
         "views": views,
         "parameters": sliders.parameters,
         "nodes": _rounded(sliders.nodes.values) if sliders.nodes else [],
@@ -116,7 +117,7 @@ def chart_data(
     }
 
 
-def _measured(described: Sequence[Described]) -> Iterator[tuple[_Test, _Bands | None]]:
+def _measured(described: Sequence[Described]) -> Iterator[_Test]:
     """Yield the measured curves with their bands, of those with several paths each path.
 
     Bands that are no curve are drawn where the measurements are that are drawn.
@@ -132,15 +133,10 @@ def _measured(described: Sequence[Described]) -> Iterator[tuple[_Test, _Bands | 
             if len(described_curve.ways) > 1 or rows_where_held(curve.mode, curve.points):
                 way = f", {held_along(curve.mode, points) or f'path {number}'}"
             abscissa, stress, is_back = curve.drawn_at()[rows], curve.stress[rows], curve.is_back[rows]
-            test = _Test(f"{name}{way}", curve.mode, curve.channel, points, abscissa, stress, curve.drawn_against,
-                         is_curve, is_back)  # fmt: skip
-            material_stress = (
-                _at(described_curve.stress_alone, shown) if has_discrepancy(described_curve.solution) else None
-            )
-            yield (
-                test,
-                _Bands(_at(described_curve.measurements, shown), _at(described_curve.stress, shown), material_stress),
-            )
+            alone = described_curve.stress_alone.at(shown) if has_discrepancy(described_curve.solution) else None
+            bands = _Bands(described_curve.measurements.at(shown), described_curve.stress.at(shown), alone)
+            yield _Test(f"{name}{way}", curve.mode, curve.channel, points, abscissa, stress, curve.drawn_against,
+                        is_curve, is_back, bands)  # fmt: skip
 
 
 def _spread(indices: IndexArray) -> IndexArray:
@@ -149,7 +145,7 @@ def _spread(indices: IndexArray) -> IndexArray:
     return np.asarray(indices[np.unique(np.linspace(0, len(indices) - 1, count).astype(int))])
 
 
-def _others(posterior: Posterior) -> Iterator[tuple[_Test, _Bands | None]]:
+def _others(posterior: Posterior) -> Iterator[_Test]:
     """Yield the loading modes of one stretch that were not measured, over the strains that were, with their bands."""
     measured, none = {mode.name for mode in posterior.model.experiment.modes}, np.zeros(0)
     for name, stable_range in posterior.stable_ranges.items():
@@ -157,7 +153,7 @@ def _others(posterior: Posterior) -> Iterator[tuple[_Test, _Bands | None]]:
             spaced = np.geomspace if stable_range.low > 0 else np.linspace  # curves bend where stretches are small
             points = spaced(stable_range.low, stable_range.high, GRID_POINTS)
             test = _Test(f"{name} (predicted)", loading_mode(name), 0, points, none, none)
-            yield test, _predicted(posterior, test)
+            yield test._replace(bands=_predicted(posterior, test))
 
 
 def _predicted(posterior: Posterior, test: _Test) -> _Bands | None:
@@ -170,10 +166,6 @@ def _predicted(posterior: Posterior, test: _Test) -> _Bands | None:
     except TissuqError:
         return None
     return _Bands(measurements, stress, material_stress)
-
-
-def _at(band: Band, indices: IndexArray) -> Band:
-    return Band(*(values[indices] for values in (band.stretch, band.median, band.low, band.high)))
 
 
 def _columns(bands: _Bands, test: _Test, unit: StressUnit) -> dict[str, Any]:

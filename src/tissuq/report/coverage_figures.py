@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = SERIES
 CELL = ["design", "strength", "noise"]
 BAR_HALF_WIDTH = 1.96
 """Half width of an error bar in Monte Carlo standard errors (95 %)."""
@@ -126,7 +125,7 @@ def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
     with panel_grid(len(panels), 2, 2.6) as (figure, axes):
         for row, ((design, noise), table) in zip(axes, panels, strict=True):
             for index, (name, line) in enumerate(table.groupby("formulation", sort=False)):
-                style: dict[str, Any] = {"color": COLORS[index % len(COLORS)], "marker": MARKERS[index % len(MARKERS)]}
+                style: dict[str, Any] = {"color": SERIES[index % len(SERIES)], "marker": MARKERS[index % len(MARKERS)]}
                 style |= {"markersize": 4, "label": name}
                 error = 100 * BAR_HALF_WIDTH * line["coverage_error"]
                 row[0].errorbar(line["strength"], 100 * line["coverage"], yerr=error, **style)
@@ -193,7 +192,7 @@ def dots_by_row(
     levels = dict(zip(names, pieces.rows(axis, names, is_named=is_named), strict=True))
     for index, (label, (of_rows, values, errors)) in enumerate(series.items()):
         heights = [levels[name] + GAP * (0.5 * (len(series) - 1) - index) for name in of_rows]
-        style: dict[str, Any] = {"fmt": MARKERS[index % len(MARKERS)], "color": COLORS[index % len(COLORS)]}
+        style: dict[str, Any] = {"fmt": MARKERS[index % len(MARKERS)], "color": SERIES[index % len(SERIES)]}
         axis.errorbar(values, heights, xerr=errors, markersize=4.5, label=label, **style)
     if nominal is not None:
         axis.axvline(nominal, color=BASE, linewidth=1, zorder=0)

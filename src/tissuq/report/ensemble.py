@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,6 @@ from tissuq.report.band_table import OF_RANGES, Bands, percent_of
 from tissuq.report.finite_element_figures import band_over_time, quantity_figure, state_figure, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Picture, Preformatted, Result, Section, Table
 from tissuq.report.source_run import Said, said_by
-from tissuq.report.tables import known_number
 from tissuq.result_warning import merged
 from tissuq.studies.ensemble import DRAWS, EnsembleStudy
 
@@ -144,7 +143,7 @@ def _at_the_end(bands: dict[str, Bands]) -> tuple[list[str], list[list[str]]]:
     return headers, [[name, *_cells(of_one, of_one.last)] for name, of_one in bands.items()]
 
 
-def _cells(bands: Bands, row: dict[str, Any]) -> list[str]:
+def _cells(bands: Bands, row: Mapping[Any, Any]) -> list[str]:
     return bands.cells(row, f"{row['time']:.4g}", bands.shares)
 
 
@@ -170,7 +169,7 @@ def _files(study: EnsembleStudy, bands: dict[str, Bands]) -> dict[str, Any]:
             "draws": result.draws,
             "failed": sum(failure.family == COMPLETE for failure in result.failures),
             "quantities": {
-                name: {key: known_number(value) for key, value in of_one.last.items() if not key.startswith("noise")}
+                name: {key: value for key, value in of_one.last.items() if not key.startswith("noise")}
                 for name, of_one in bands.items()
             },
             "measured_invariants": {name: list(ensemble.most) for name, ensemble in prepared.ensembles.items()},
@@ -303,7 +302,7 @@ def _quantity(study: EnsembleStudy, name: str, bands: Bands) -> tuple[Block, ...
     """Return definition, figure and some times of a quantity."""
     several, has_shares = bands.of_several, bool(bands.shares)
     picked = several.iloc[np.unique(np.linspace(0, len(several) - 1, ROWS).round().astype(int))]
-    rows = [_cells(bands, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")]
+    rows = [_cells(bands, row) for row in picked.to_dict("records")]
     quantity = next(quantity for quantity in study.prepared.quantities if quantity.name == name)
     is_function = isinstance(quantity, FunctionQuantity)  # whose file is known by its absolute name
     text = study.prepared.settings.quantities[name] if is_function else quantity.text

@@ -61,13 +61,13 @@ def law_result(study: LawStudy, beside: Path = Path()) -> Result:
     )
     law, names = study.recommended, list(comparison.fits)
     laws = " and ".join([", ".join(names[:-1]), names[-1]])
-    answer = comparison.fits[law].answer
+    answer, meaning = comparison.fits[law].answer, next(iter(comparison.fits.values())).model.meaning
     result = Result(
         command="fit",
         title=f"{named(study.experiment)}: which law of {laws if len(names) <= FEW_LAWS else len(names)}",
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
-        finding=f"{law_lead(study)} The interval is of {study.meaning}.",
+        finding=f"{law_lead(study)} The interval is of {meaning}.",
         uses=tuple(use._replace(purpose=f"{use.purpose}{LAW_OF_USE}{law}") for use in answer.uses),
         next_step=_next_step(law, answer, is_of_all=settings.laws == (ALL_LAWS,)),
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),

@@ -27,7 +27,6 @@ from tissuq.report.population_in_words import (
     between_specimens,
     effects_of_covariates,
     methods_of_population,
-    needed_of,
     needed_table_of,
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
@@ -93,7 +92,8 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     summaries = {"population": population.summary, "specimens": population.specimen_summary}
     tables = {name: _with_units(study, summary(unit=unit.name)) for name, summary in summaries.items()}
     tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
-    tables |= {"specimens_needed": needed} if (needed := needed_of(study)) is not None else {}
+    needed = None if settings.aim is None else population.specimens_needed(settings.aim)
+    tables |= {} if needed is None else {"specimens_needed": needed}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
     bands, not_predicted = stresses_where_measured(population, (True, False))
     if bands:

@@ -108,12 +108,6 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
     )  # fmt: skip
 
 
-def needed_of(study: PopulationStudy) -> pd.DataFrame | None:
-    """Return `Population.specimens_needed` for the aim of the settings, if there is one."""
-    aim = study.settings.aim
-    return None if aim is None else study.population.specimens_needed(aim)
-
-
 def needed_table_of(study: PopulationStudy, needed: pd.DataFrame | None) -> tuple[Table, ...]:
     """Return the table of how many specimens are needed; none without an aim."""
     if needed is None:

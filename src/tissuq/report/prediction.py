@@ -133,8 +133,7 @@ def _stresses_at_the_end(prediction: Prediction) -> list[Number]:
         band = prediction.curves[channel, prediction.kinds[0], False]
         median, low, high = (float(column[index]) / scale for column in (band.median, band.low, band.high))
         words = f"{name} at {_point(prediction, index)}{'' if is_known else ', extrapolated'}"
-        share = f"{100 * prediction.prob:.4g} % interval"
-        numbers.append(Number(words, median, low, high, prediction.unit.name, share))
+        numbers.append(Number(words, median, low, high, prediction.unit.name, f"{prediction.percent} interval"))
     return numbers
 
 
@@ -146,7 +145,7 @@ def _shares(prediction: Prediction) -> list[Number]:
         inside, all_of_them = round(float((rows["inside"] * rows["count"]).sum())), int(rows["count"].sum())
         value = f"{inside} of {all_of_them}"
         width = f"half width of the band {_share_words(float(rows['half_width'].max()))}"
-        remark = f"{100 * prediction.prob:.4g} % expected; {width} of the stress"
+        remark = f"{prediction.percent} expected; {width} of the stress"
         numbers.append(Number("measurements inside the band", value, remark=remark))
     extrapolated = count - int(prediction.is_calibrated.sum())
     remark = f"{'outside' if extrapolated else 'all within'} the {_measured_range(prediction)}"
@@ -181,7 +180,7 @@ def _next_step(prediction: Prediction, run: str) -> str:
 
 
 def _caption(prediction: Prediction) -> str:
-    share, deduced = f"{100 * prediction.prob:.4g} %", NOT_COMPRESSED * prediction.is_compression_deduced
+    share, deduced = prediction.percent, NOT_COMPRESSED * prediction.is_compression_deduced
     return (
         f"Dark: {share} of the stress itself, noise off. Light: {share} of measurements of it. Hatched: outside the "
         f"{_measured_range(prediction)}; there bands may run out of the panel.{deduced}"
@@ -190,8 +189,7 @@ def _caption(prediction: Prediction) -> str:
 
 def _sections(prediction: Prediction) -> tuple[Section, ...]:
     """Return what a page folds: all bands as figures, how to read them, the warnings of the fit, the measurements."""
-    model, data = prediction.posterior.model, prediction.data
-    share = f"{100 * prediction.prob:.4g} %"
+    model, data, share = prediction.posterior.model, prediction.data, prediction.percent
     figure = Picture(
         "prediction", lambda: prediction_figure(prediction), f"All bands of the stress in mode {prediction.mode.name}",
         _caption(prediction), len(prediction.kinds) == 1,
@@ -245,8 +243,8 @@ def _lead_of_scores(prediction: Prediction) -> str:
         ]
         stress_words = f" ({name})" if len(prediction.stresses) > 1 else ""
         findings = [
-            f"{100 * row['inside']:.0f} % lie in the {100 * prediction.prob:.4g} % band "
-            f"({_kind_words(prediction, row['discrepancy'] == 'with')}), whose median errs by "
+            f"{100 * row['inside']:.0f} % lie in the {prediction.percent} band "
+            f"({prediction.called(row['discrepancy'] == 'with')}), whose median errs by "
             f"{_share_words(row['error'])} of the stress"
             for row in rows.to_dict("records")
         ]
@@ -262,19 +260,15 @@ def _lead_of_bands(prediction: Prediction) -> str:
 
     The numbers are of the end of what is calibrated, with the discrepancy where the run has one.
     """
-    index, change, kind = (
-        _calibrated_end(prediction),
-        _changes(prediction),
-        _kind_words(prediction, prediction.kinds[0]),
-    )
+    index, change, kind = _calibrated_end(prediction), _changes(prediction), prediction.called(prediction.kinds[0])
     farthest = int(change.argmax())
     if change[index] < change[farthest]:
         stresses = _stresses_at(prediction, farthest, prediction.kinds[0])
         return f"Extrapolated to {_point(prediction, farthest)}, {kind}, {stresses}."
     if not prediction.kinds[0]:
         return f"Predicted by {kind}."
-    material_words = _kind_words(prediction, kind=False)
-    return f"Predicted {kind}. There, for {material_words}, {_stresses_at(prediction, index, kind=False)}."
+    of_material = _stresses_at(prediction, index, kind=False)
+    return f"Predicted {kind}. There, for {prediction.called(kind=False)}, {of_material}."
 
 
 def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
@@ -291,7 +285,7 @@ def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
         median, ends = _median_words(band, index, scale), _end_words(band, index, scale)
         half_width = (band.high[index] - band.low[index]) / 2
         is_known = half_width <= UNKNOWN * largest
-        unit, percent = prediction.unit.name, f"{100 * prediction.prob:.4g} %"
+        unit, percent = prediction.unit.name, prediction.percent
         known, unknown = f"{median} {unit} ({percent}: {ends})", f"not known at all ({percent}: {ends} {unit})"
         texts.append(f"the {name} is {known if is_known else unknown}")
     return " and ".join(texts)
@@ -327,8 +321,7 @@ def band_table(prediction: Prediction) -> Table:
     """Return some rows of the bands, from end to end, as text in the unit of the run."""
     rows, unit, several = [], prediction.unit, len(prediction.stresses) > 1
     names, count = [control.name for control in prediction.mode.controls], len(prediction.points)
-    share = f"{100 * prediction.prob:.4g} %"
-    bands = ["median", f"{share} of the stress", f"{share} of measurements"]
+    bands = ["median", f"{prediction.percent} of the stress", f"{prediction.percent} of measurements"]
     bands_alone = ["alone: median", "alone: stress", "alone: measurements"] if prediction.kinds[0] else []
     indices = np.unique(np.linspace(0, count - 1, min(count, MAX_ROWS)).round().astype(int))
     for channel, name in enumerate(prediction.stresses):
@@ -351,11 +344,11 @@ def score_table(prediction: Prediction, scores: pd.DataFrame, data: str) -> Tabl
     """Return as text how the measurements of that name are predicted."""
     several, unit = len(prediction.stresses) > 1, prediction.unit.name
     columns: dict[str, Callable[[Any], str]] = {
-        "prediction": lambda row: _kind_words(prediction, row["discrepancy"] == "with"),
+        "prediction": lambda row: prediction.called(row["discrepancy"] == "with"),
         **({"measured": itemgetter("measured")} if several else {}),
         "range": itemgetter("range"),
         "points": lambda row: f"{row['count']}",
-        f"inside {100 * prediction.prob:.4g} %": lambda row: _share_words(row["inside"]),
+        f"inside {prediction.percent}": lambda row: _share_words(row["inside"]),
         "half width": lambda row: _share_words(row["half_width"]),
         "error": lambda row: _share_words(row["error"]),
         f"CRPS, {unit}": lambda row: _stress(row["crps"]),
@@ -363,12 +356,6 @@ def score_table(prediction: Prediction, scores: pd.DataFrame, data: str) -> Tabl
     }
     text_columns = (1, 2) if several else (1,)
     return Table.of(scores.to_dict("records"), columns, f"Measurements of {data}", text_columns=text_columns)
-
-
-def _kind_words(prediction: Prediction, kind: bool) -> str:
-    """Return what is predicted: ``with the discrepancy gp``, or ``neo-hookean alone``."""
-    model = prediction.posterior.model
-    return f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
 
 
 def _share_words(value: float) -> str:

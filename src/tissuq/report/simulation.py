@@ -27,7 +27,7 @@ from tissuq.report.finite_element_figures import (
 )
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.source_run import Said, said_by
-from tissuq.report.tables import known_number, significant
+from tissuq.report.tables import significant
 from tissuq.studies.structure import SimulationStudy
 
 if TYPE_CHECKING:
@@ -138,14 +138,13 @@ def _readable(simulation: Simulation, bands: Bands) -> tuple[list[str], list[lis
     """Return headers and rows of the forces as text."""
     case, shares = simulation.case, [*bands.shares, "noise"]
     along, mean = f"{case.travel_name}, {case.travel_unit}", f"{case.response}, {bands.unit}"
-    rows = [{str(key): value for key, value in row.items()} for row in bands.table.to_dict("records")]
+    rows = bands.table.to_dict("records")
     cells = [bands.cells(row, f"{row[case.travel_column]:.3g}", shares) for row in rows]
     return bands.headers(along, mean, bands.percent, shares), cells
 
 
 def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
     simulation = study.simulation
-    last = {key: None if value != value else value for key, value in table.iloc[-1].to_dict().items()}
     return {
         "case": simulation.case.name,
         "sizes": vars(simulation.case),
@@ -153,14 +152,14 @@ def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
         "complete_draws": int(np.isfinite(simulation.forces[COMPLETE][:, -1]).sum()),
         "full_draws": int(simulation.in_full.sum()),
         "probability_of_band": band_probability(int(table["draws"].iloc[-1])),
-        "last_step": last,
+        "last_step": table.iloc[-1].to_dict(),
         "beyond": _last_mean(simulation.volume_beyond),
         "energy_beyond": _last_mean(simulation.energy_beyond),
         "measured_invariants": list(simulation.max_invariants),
         "mesh_change": None if simulation.mesh_change is None else simulation.mesh_change[0],
         "noise_sd": simulation.noise_sd,
         "first_order_error": {
-            family: {name: known_number(float(of_steps[-1])) for name, of_steps in error._asdict().items()}
+            family: {name: float(of_steps[-1]) for name, of_steps in error._asdict().items()}
             for family, error in simulation.first_order_error.items()
         },
         "admissible_share": simulation.ensembles[COMPLETE].admissible_share,

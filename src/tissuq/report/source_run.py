@@ -144,12 +144,19 @@ def copy_source(run: Path, folder: Path) -> None:
         scratch.rename(stored)
 
 
-def stored_mesh(mesh: str | None, name: str = "mesh") -> str | None:
-    """Return where the folder of a simulation holds the mesh that it is of, if there is one."""
-    return None if mesh is None else f"{name}{Path(mesh).suffix}"
+def mesh_files(case: Case, finer: Case | None) -> dict[str, tuple[str, bytes]]:
+    """Return copies of the meshes that a case and a finer one are of, name and content, by the settings of these."""
+    from tissuq.finite_elements.body_from_file import BodyFromFile
+
+    bodies = {"mesh": case, "finer_mesh": finer}
+    return {
+        setting: (f"{setting.replace('_', '-')}{Path(body.file).suffix}", body.content())
+        for setting, body in bodies.items()
+        if isinstance(body, BodyFromFile)
+    }
 
 
-def check_mesh(case: Case, folder: Path) -> None:
+def check_mesh(name: str, content: bytes, folder: Path) -> None:
     """Refuse a folder that holds a simulation of another mesh.
 
     Raises
@@ -157,20 +164,5 @@ def check_mesh(case: Case, folder: Path) -> None:
     InputError
         When it does.
     """
-    for name, content in _mesh_file(case, "mesh").items():
-        stored = folder / name
-        if stored.is_file() and stored.read_bytes() != content:
-            raise InputError(f"'{folder}' holds a simulation of another mesh; choose another folder with --out.")
-
-
-def copy_mesh(case: Case | None, folder: Path, name: str = "mesh") -> None:
-    """Copy the mesh that a case is of, if it is of one, into the folder of a simulation."""
-    for file, content in _mesh_file(case, name).items():
-        (folder / file).write_bytes(content)
-
-
-def _mesh_file(case: Case | None, name: str) -> dict[str, bytes]:
-    """Return the copy of the mesh that a case is of by its name; nothing where it is of none."""
-    from tissuq.finite_elements.body_from_file import BodyFromFile
-
-    return {str(stored_mesh(case.file, name)): case.content()} if isinstance(case, BodyFromFile) else {}
+    if (folder / name).is_file() and (folder / name).read_bytes() != content:
+        raise InputError(f"'{folder}' holds a simulation of another mesh; choose another folder with --out.")

@@ -33,6 +33,7 @@ from tissuq.report.summary import (
 )
 from tissuq.report.tables import Row, significant
 from tissuq.report.writer import data_file, posterior_files
+from tissuq.result_warning import has_code
 from tissuq.studies.specimen import SpecimenStudy
 
 if TYPE_CHECKING:
@@ -197,7 +198,8 @@ def _extent(assessments: Mapping[str, Assessment]) -> Section:
 
 def _uncut(study: SpecimenStudy) -> list[str]:
     """Return the discrepancies whose posteriors no bound of a prior cuts, or all where each is cut."""
-    return [name for name in study.posteriors if not study.is_cut_by_prior(name)] or list(study.posteriors)
+    uncut = [name for name, fit in study.posteriors.items() if not has_code(fit.warnings, "prior-bound")]
+    return uncut or list(study.posteriors)
 
 
 def _over_discrepancies(study: SpecimenStudy) -> tuple[Number, ...]:

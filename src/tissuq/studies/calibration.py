@@ -29,7 +29,6 @@ from tissuq.mechanics import material_named
 from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.parameter import Parameter
 from tissuq.posterior.posterior import Posterior
-from tissuq.result_warning import ResultWarning
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings, OfModel
 from tissuq.studies.earlier_run import load_law, priors_of
@@ -94,11 +93,6 @@ class CalibrationStudy:
     def label(self, symbol: str) -> str:
         """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""
         return f"{symbol} [{self.units[symbol]}]" if symbol in self.units else symbol
-
-    @property
-    def warnings(self) -> list[ResultWarning]:
-        """Warnings about the calibration."""
-        return list(self.calibration.warnings)
 
 
 def run_calibration(

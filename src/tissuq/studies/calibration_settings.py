@@ -288,16 +288,15 @@ class CalibrationSettings(ModelSettings):
         from tissuq.experiments.units import LENGTH
 
         cards = self.card_settings()
-        texts = {key: self.quantities[key] if key else next(iter(self.quantities.values())) for key in of_model.names}
-        named = {key: key or next(iter(self.quantities)) for key in texts}
-        quantities = {named[key]: located(text, beside) for key, text in texts.items()}
+        unit_of = {name or next(iter(self.quantities)): units.get(name, ("", ""))[1] for name in of_model.names}
+        quantities = {name: located(self.quantities[name], beside) for name in unit_of}
         factors = {
-            named[key]: self.factors.get(named[key], 1.0) * conversion(text, cards, units.get(key, ("", ""))[1])
-            for key, text in texts.items()
+            name: self.factors.get(name, 1.0) * conversion(self.quantities[name], cards, unit)
+            for name, unit in unit_of.items()
         }
         is_one, control_unit = len(quantities) == 1, units.get(of_model.names[0], ("", ""))[0]
         controlled, along = of_model.controlled, self.along.get(of_model.controlled)
-        compared = [(named[key], text, units.get(key, ("", ""))[1]) for key, text in texts.items()]
+        compared = [(name, self.quantities[name], unit) for name, unit in unit_of.items()]
         for name, text, unit in [*compared, *([(controlled, along, control_unit)] if along else [])]:
             if name not in self.factors:
                 check_unit_of_function(name, text, cards, unit)

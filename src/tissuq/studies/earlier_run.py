@@ -147,7 +147,7 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
         command = recipe.read_text(encoding="utf-8").partition("\n")[0]
     if " tissuq fit " not in command:
         raise InputError(f"run '{run}' is not a run of tissuq fit; only these have a posterior to continue from.")
-    return load_settings(LawSettings if _compares_laws(run) else SpecimenSettings, recipe, {})
+    return load_settings(LawSettings if _has_setting(run, "laws") else SpecimenSettings, recipe, {})
 
 
 def posteriors_in(run: Path) -> dict[str, Path]:
@@ -156,13 +156,10 @@ def posteriors_in(run: Path) -> dict[str, Path]:
         raise InputError(f"there is no run folder '{run}'.")
     files = {file.stem: file for file in sorted((run / POSTERIORS).glob("*.nc"))}
     if not files:
-        is_calibration = False
-        with suppress(InputError):
-            is_calibration = setting_of(run / RECIPE, "server_model") is not None
         advice = (
             "repeat tissuq calibrate with the law of the model and the stretches in it, as in --material neo-hookean "
             "--range 0.7:1.3"
-            if is_calibration
+            if _has_setting(run, "server_model")
             else "give the folder of a run of tissuq fit, as in runs/specimen"
         )
         raise InputError(f"folder '{run}' has no posterior of a material ({POSTERIORS}/*.nc): {advice}.")
@@ -174,7 +171,7 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None, material: str | M
 
     A law is also chosen by the name that is given for the discrepancy, as it was before it had an option of its own.
     """
-    files, is_of_laws = posteriors_in(run), _compares_laws(run)
+    files, is_of_laws = posteriors_in(run), _has_setting(run, "laws")
     if is_of_laws:  # those that were written before a sum had one name
         files = {standard_name(name): file for name, file in files.items()}
     names = list(files)
@@ -196,10 +193,10 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None, material: str | M
     return files[name]
 
 
-def _compares_laws(run: Path) -> bool:
-    """Return whether the posteriors of a run are those of several laws."""
+def _has_setting(run: Path, name: str) -> bool:
+    """Return whether the recipe of a run has a setting: ``laws`` where its posteriors are those of several laws."""
     with suppress(InputError):
-        return setting_of(run / RECIPE, "laws") is not None
+        return setting_of(run / RECIPE, name) is not None
     return False
 
 
@@ -214,7 +211,7 @@ def load_law(run: Path, material: str) -> Posterior:
     law = material_named(material)
     files = posteriors_in(run) if run.is_dir() else {}
     if len(files) > 1 and not {law.name, Auto.name} & set(files):
-        if _compares_laws(run):
+        if _has_setting(run, "laws"):
             raise _of_other_materials(run, list(files), law)
         named = " or ".join(map(str, files.values()))
         raise InputError(f"the run '{run}' has several posteriors: give the file of one, --prior-run {named}.")

@@ -67,9 +67,9 @@ class PreparedEnsemble:
         """Return the blocks of cards of a draw, by material."""
         return {material: cards.blocks[number] for material, cards in self.cards[family].items()}
 
-    def diff(self, number: int = 0) -> str:
-        """Return the difference between the model and that of a draw."""
-        return self.deck.diff(self.deck.with_materials(self.blocks(COMPLETE, number)))
+    def diff(self) -> str:
+        """Return the difference between the model and that of the first draw."""
+        return self.deck.diff(self.deck.with_materials(self.blocks(COMPLETE, 0)))
 
     def tasks(self, folder: Path, running: SolverRun = USUALLY) -> list[ModelRun]:
         """Return the runs: the complete draws first, that on a finer mesh last."""

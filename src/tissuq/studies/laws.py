@@ -50,11 +50,6 @@ class LawStudy:
         return self.experiment.shown_unit
 
     @property
-    def meaning(self) -> str:
-        """What the intervals are of, in words."""
-        return next(iter(self.comparison.fits.values())).model.meaning
-
-    @property
     def skipped(self) -> Mapping[str, str]:
         """Laws that could not be fitted, and why."""
         return self.comparison.skipped

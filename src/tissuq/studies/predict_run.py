@@ -105,8 +105,7 @@ def _extrapolated(
     is_beyond, shares = ~calibrated_points(posterior, mode, grid), np.zeros(len(grid))
     if is_beyond.any():
         without = _bands(posterior, mode, grid[is_beyond], channel, True, errs_beyond=False, **options)[False]
-        band_beyond = Band(*(column[is_beyond] for column in vars(band).values()))
-        shares[is_beyond] = extrapolation_share(band_beyond, without)
+        shares[is_beyond] = extrapolation_share(band.at(is_beyond), without)
     return shares
 
 

@@ -97,6 +97,16 @@ class Prediction:
         return tuple(stress.replace("engineering stress", name) for stress in self.mode.stresses)
 
     @property
+    def percent(self) -> str:
+        """The probability of the bands, in words."""
+        return f"{100 * self.prob:.4g} %"
+
+    def called(self, kind: bool) -> str:
+        """Return what is predicted: ``with the discrepancy gp``, or ``neo-hookean alone``."""
+        model = self.posterior.model
+        return f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
+
+    @property
     def controls(self) -> dict[str, FloatArray]:
         """The points by control: stretch, and stretch2 of a second one."""
         columns = self.points.reshape(len(self.points), -1).T
@@ -319,9 +329,7 @@ def _label(prediction: Prediction, number: int) -> str:
 
 
 def _title(prediction: Prediction, channel: int, kind: bool) -> str:
-    model = prediction.posterior.model
-    name = f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
     if prediction.scores is None:
-        return name
+        return prediction.called(kind)
     row = prediction.scores_of(kind).iloc[channel]
-    return f"{name}:  {round(row['inside'] * row['count'])} of {row['count']} inside"
+    return f"{prediction.called(kind)}:  {round(row['inside'] * row['count'])} of {row['count']} inside"

@@ -32,7 +32,7 @@ from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.scores import judged
-from tissuq.result_warning import ResultWarning, Severity, has_code, merged, most_severe_first
+from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
 from tissuq.studies.fit_settings import ALL, SpecimenSettings
 
 if TYPE_CHECKING:
@@ -89,10 +89,6 @@ class SpecimenStudy:
         """The parameter that summaries put first."""
         return next(iter(self.posteriors.values())).model.headline
 
-    def is_cut_by_prior(self, name: str) -> bool:
-        """Whether a bound of a prior, not the data, determines part of a fit."""
-        return has_code(self.posteriors[name].warnings, "prior-bound")
-
     @property
     def not_converged(self) -> list[str]:
         """Discrepancies with which sampling has not converged."""
@@ -135,7 +131,7 @@ def run_specimen(
     (material,) = settings.fitted_laws({settings.material: law} if law else {}).values()
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
-    check_priors(settings, chain.from_iterable(symbols.values()))
+    priors_in_mpa(settings, [material], experiment)  # refuses those of no parameter
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
@@ -251,23 +247,12 @@ def priors_in_mpa(settings: SpecimenSettings, laws: Iterable[Material], experime
     """
     of_fits = (parameters_of(settings, law, name, experiment) for law in laws for name in _names(settings))
     parameters = list(chain.from_iterable(of_fits))
-    check_priors(settings, parameters)
-    return _priors(settings, parameters, stress_unit(experiment.stress_unit))
-
-
-def check_priors(settings: SpecimenSettings, parameters: Iterable[Parameter]) -> None:
-    """Refuse priors of what is none of the parameters of any fit.
-
-    Raises
-    ------
-    InputError
-        When there is one.
-    """
     symbols = dict.fromkeys(parameter.symbol for parameter in parameters)
     if unknown := sorted(settings.priors.keys() - symbols.keys()):
         raise InputError(
             f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(symbols)}."
         )
+    return _priors(settings, parameters, stress_unit(experiment.stress_unit))
 
 
 def _priors(settings: SpecimenSettings, parameters: Iterable[Parameter], unit: StressUnit) -> dict[str, Prior]:
