@@ -126,6 +126,8 @@ def _reporting(
         return worst_of(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
     if "prior-dominates" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
+    if "sharp-prior" in codes:
+        return worst_of(verdict, Verdict.CARE), f"{width}, or better: the prior that was given tells more than is in it"
     if "not-near-reference" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
     if missed:
