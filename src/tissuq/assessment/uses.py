@@ -208,7 +208,7 @@ def _band_of(solution: Solution, curve: Curve) -> Band:
     """Return the band of the stress itself at measured points that span a curve."""
     order = np.argsort(curve.abscissa, kind="stable")
     rows = order[np.linspace(0, len(order) - 1, min(GRID_POINTS, len(order))).astype(int)]
-    return predict_band(solution, curve.points[rows], noise=False, mode=curve.mode, channel=curve.channel)
+    return predict_band(solution, curve.points[rows], noise=False, curve=curve)
 
 
 def relative_half_width(band: Band) -> float:
