@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 import gallery
 import tissuq as tq
@@ -306,6 +307,33 @@ def test_a_prior_that_outweighs_the_data_is_said_and_the_modulus_reported_with_c
         assert verdicts(posterior)[0] == Verdict.CARE
     wide = tq.fit(data, priors={"C10": tq.Normal(3e-3, 3e-2)})
     assert "prior-dominates" not in {warning.code for warning in wide.warnings}
+
+
+def test_a_prior_as_sharp_as_the_error_in_common_is_said_and_its_advice_gives_both_together():
+    """Against a grid of C10 of the specimen, under its prior: what is measured is C10 times 1 + e."""
+    data = tq.simulate("neo-hookean", {"C10": 0.6}, np.linspace(0.85, 1.4, 20), noise_sd=0.004, seed=2)
+    options = {"discrepancy": "none", "noise": "independent"}
+    sharp = tq.fit(data, **options, priors={"C10": tq.Normal(0.5, 0.03)})
+    assert "sharp-prior" in {warning.code for warning in sharp.warnings}
+    for prior, tolerances in [
+        (tq.Normal(0.5, 0.3), None),
+        (tq.Normal(0.5, 0.03), "as-tested"),
+        (tq.Uniform(0.4, 0.7), None),
+    ]:
+        found = tq.fit(data, **options, priors={"C10": prior}, tolerances=tolerances)
+        assert "sharp-prior" not in {warning.code for warning in found.warnings}
+    alone = tq.fit(data, **options)
+    as_measured = tq.fit(data, **options, tolerances={"stress": 0, "test": 0}).marginals["C10"]
+    values = np.linspace(0.3, 0.9, 2001)
+    variance = as_measured.sd**2 + (alone.model.common_error * values) ** 2
+    weights = norm(0.5, 0.03).pdf(values) * norm(values, np.sqrt(variance)).pdf(as_measured.mean)
+    weights /= weights.sum()
+    exact = weights @ values
+    inverse = np.array([alone.marginals["C10"].sd, 0.03]) ** -2.0
+    advised = inverse @ [alone.marginals["C10"].mean, 0.5] / inverse.sum()
+    sd = np.sqrt(weights @ (values - exact) ** 2)
+    assert abs(advised - exact) < 0.5 * sd < 0.5 * abs(sharp.marginals["C10"].mean - exact)
+    assert inverse.sum() ** -0.5 == pytest.approx(sd, rel=0.15)
 
 
 def test_stresses_of_other_modes_that_are_known_differently_in_tension_and_compression_are_told_apart():

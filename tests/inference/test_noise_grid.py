@@ -30,14 +30,14 @@ def errors(model, tolerances=TOLERANCES):
     return sum(size**2 * of_unit[name] for name, size in tolerances.sizes.items())
 
 
-def given(covariance, column=X):
+def given(covariance, column=X, stress=STRESS):
     """Log densities of the data, and means and variances of the factor of a column, for covariances (..., 12, 12).
 
     Its prior has a width of 5, and ends far away.
     """
     inverse = np.linalg.inv(covariance)
-    precision, pull = column @ inverse @ column, column @ inverse @ STRESS
-    rest = STRESS @ inverse @ STRESS - pull**2 / precision
+    precision, pull = column @ inverse @ column, column @ inverse @ stress
+    rest = stress @ inverse @ stress - pull**2 / precision
     constant = 11 * np.log(2 * np.pi) + 2 * np.log(5)
     density = -0.5 * (rest + np.linalg.slogdet(covariance)[1] + np.log(precision) + constant)
     return density, pull / precision, 1 / precision
@@ -115,7 +115,7 @@ def test_an_energy_beside_them_is_summed_over_its_amplitudes_and_lengths(data):
     assert_agrees(posterior, np.log(noise), weights + of_noise[:, None], mean, variance)
 
 
-@pytest.mark.parametrize("ends", [(0.012, 0.014), (0.03, 0.2), (1e-4, 0.02)], ids=str)
+@pytest.mark.parametrize("ends", [(0.012, 0.014), (0.03, 0.2), (1e-4, 0.02), (0.003, 0.2), (0.006, 0.2)], ids=str)
 def test_bounds_of_the_noise_are_obeyed(data, ends):
     priors = {"C10": tq.Uniform(0, 5), "noise_sd": tq.Uniform(*ends)}
     posterior = tq.fit(data, discrepancy="none", priors=priors, tolerances=TOLERANCES)
@@ -125,6 +125,17 @@ def test_bounds_of_the_noise_are_obeyed(data, ends):
     cell = np.full(2001, log_noise[1] - log_noise[0])
     cell[[0, -1]] /= 2
     assert_agrees(posterior, log_noise, density + log_noise + np.log(cell) - np.log(ends[1] - ends[0]), mean, variance)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_mass_of_noise_less_than_the_resolution_is_in_the_evidence(seed):
+    stress = 0.5 * X + 0.005 * np.random.default_rng(seed).standard_normal(12)
+    data = tq.Experiment("uniaxial", STRETCH, stress)
+    posterior = tq.fit(data, discrepancy="none", priors=PRIORS, tolerances=TOLERANCES)
+    noise = np.exp(LOG_NOISE)
+    density, *_ = given(noise[:, None, None] ** 2 * np.eye(12) + errors(posterior.model), stress=stress)
+    log_weights = density + halfnorm(scale=0.1).logpdf(noise) + LOG_NOISE + np.log(LOG_NOISE[1] - LOG_NOISE[0])
+    assert posterior.log_evidence == pytest.approx(np.logaddexp.reduce(log_weights), abs=0.006)
 
 
 def test_noise_far_below_the_resolution_of_the_test_does_not_matter(data):

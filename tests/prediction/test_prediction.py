@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal, norm
 import gallery
 import tissuq as tq
 from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.prediction.bands import predict_band
 from tissuq.prediction.densities import pointwise_log_likelihood
 from tissuq.prediction.moments import borne, drawn_curves, stress_moments, variance_of_noise
 
@@ -155,3 +156,25 @@ def test_the_band_at_a_stretch_does_not_depend_on_where_else_it_is_asked_for():
         posterior.predict([1.1, 1.2, 2.5], mode="equibiaxial"),
     )
     assert np.allclose(near, far[:2], rtol=1e-6)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+def test_every_test_of_one_mode_is_compared_with_the_band_of_its_own_noise_and_error(shift):
+    """Known noise and, with a shift, a constant error of each test: bands are material + error +- 1.96 sd."""
+    stretch, sds = np.linspace(0.85, 1.4, 40), (0.004, 0.05)
+    shape, generator = stretch - stretch**-2, np.random.default_rng(1)
+    errors = (-shift, shift) if shift else (0.0, 0.0)
+    tests = [
+        tq.Experiment("uniaxial", stretch, shape + error + sd * generator.standard_normal(40), f"test {sd}")
+        for sd, error in zip(sds, errors, strict=True)
+    ]
+    options = {"discrepancy": "constant", "priors": {"S": tq.HalfNormal(1e-5)}} if shift else {"discrepancy": "none"}
+    posterior = tq.fit(tests, **options, noise_sd=sds, tolerances="as-tested")
+    for test, curve, sd, error in zip(tests, posterior.model.experiment.curves, sds, errors, strict=True):
+        band = predict_band(posterior.solution, stretch, curve=curve)
+        assert np.allclose(band.low, shape + error - 1.96 * sd, atol=0.5 * sd)
+        assert np.allclose(band.high, shape + error + 1.96 * sd, atol=0.5 * sd)
+        inside = (band.low <= test.stress) & (test.stress <= band.high)
+        assert np.array_equal(posterior.inside_bands()[tests.index(test)], inside)
+        assert inside.mean() > 0.85
+    assert "measurements are inside" not in " ".join(posterior.warnings)

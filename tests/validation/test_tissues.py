@@ -10,6 +10,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.errors import InputError
+from tissuq.report.tissues import tissue_result
 from tissuq.validation.tissues import (
     TissueSettings,
     read_corpus,
@@ -195,6 +196,14 @@ def test_a_fit_that_fails_is_counted_and_says_why(folder):
     assert "add a matrix" in result["failure"]
     summary = summarise_tissues([result, carry_out(settings, task)])
     assert summary.loc[0, ["predictions", "failed"]].tolist() == [1, 1]
+
+
+def test_a_set_that_a_protocol_finds_nothing_in_is_named(folder):
+    settings = TissueSettings(folder=str(folder), protocols=("tests", "specimens"), formulations=("none",))
+    results = [{"key": str(task.number), **carry_out(settings, task)} for task in tasks_of(settings)]
+    (missing,) = (section for section in tissue_result(settings, results).sections if section.title == "Not predicted")
+    ((sentence,),) = missing.blocks
+    assert sentence.startswith("Each test from the others of the same specimen: nothing in gel-axial, ")
 
 
 def test_tolerances_are_those_of_every_fit(folder):

@@ -126,6 +126,8 @@ def _reporting(
         return worst_of(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
     if "prior-dominates" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}, by the prior that was given as much as by the data, or more"
+    if "sharp-prior" in codes:
+        return worst_of(verdict, Verdict.CARE), f"{width}, or better: the prior that was given tells more than is in it"
     if "not-near-reference" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}, extrapolated to rest, beside which too little was measured"
     if missed:
@@ -206,7 +208,7 @@ def _band_of(solution: Solution, curve: Curve) -> Band:
     """Return the band of the stress itself at measured points that span a curve."""
     order = np.argsort(curve.abscissa, kind="stable")
     rows = order[np.linspace(0, len(order) - 1, min(GRID_POINTS, len(order))).astype(int)]
-    return predict_band(solution, curve.points[rows], noise=False, mode=curve.mode, channel=curve.channel)
+    return predict_band(solution, curve.points[rows], noise=False, curve=curve)
 
 
 def relative_half_width(band: Band) -> float:

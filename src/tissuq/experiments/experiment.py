@@ -330,6 +330,10 @@ class Experiment:
         curves = (number for number, curve in enumerate(self.curves) if (curve.mode, curve.channel) == (mode, channel))
         return mode.paths[channel].at(points, next(curves, UNMEASURED))
 
+    def states_of(self, curve: Curve, points: FloatArray) -> States:
+        """Return the states at points of one of the curves."""
+        return curve.path.at(points, self.curves.index(curve))
+
     @property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """What is implausible in files and tests that were read, each once with the names of the tests of several."""

@@ -91,7 +91,7 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     curve, count = curves[0], f", 1 of {len(curves)}" if len(curves) > 1 else ""
     across = points_along(curve, SMALL_POINTS)
     rough = replace(solution, representation=Representation.of(solution.mixture.thinned(FEW)))
-    of_curve = predict_band(rough, across, mode=curve.mode, channel=curve.channel)
+    of_curve = predict_band(rough, across, curve=curve)
     low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
     measured = curve.stress / unit.to_mpa
     limits = limits_of([measured, median], [low, high])

@@ -117,7 +117,7 @@ class Described:
         return self._bands(False) if has_discrepancy(self.solution) else self._joint
 
     def _bands(self, discrepancy: bool) -> list[Band]:
-        options: dict[str, Any] = {"prob": self.prob, "mode": self.curve.mode, "channel": self.curve.channel}
+        options: dict[str, Any] = {"prob": self.prob, "curve": self.curve}
         return predict_bands([(1.0, self.solution)], self.points, (True, False), discrepancy=discrepancy, **options)
 
 
@@ -208,7 +208,7 @@ def share_along(solution: Solution, curve: Curve, prob: float = 0.95) -> tuple[l
     """
     model = solution.model
     points = points_along(curve, SHARE_POINTS)
-    states = model.experiment.states_at(points, curve.mode, curve.channel)
+    states = model.experiment.states_of(curve, points)
     components = solution.mixture[systematic(solution.mixture.weights[None], SHARE_DRAWS)[0]]
     with one_thread():
         material, discrepancy = drawn_curves(model, components, states)

@@ -348,7 +348,8 @@ class Posterior(PosteriorPlots):
         prob : float
             Probability between low and high, equal tails.
         mode : str or LoadingMode, optional
-            Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy.
+            Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy. Of
+            several tests of a mode that differ in noise, or in a discrepancy of the stress, the first one counts.
         channel : int
             Which of the mode's stresses, from 0, where it has several.
         stress_type : str

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil, isfinite, log
 
 import numpy as np
@@ -21,7 +21,7 @@ from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ScaleError, TestError
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import ESTIMANDS
-from tissuq.parameters.priors import Uniform
+from tissuq.parameters.priors import Interval, Uniform
 from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -37,6 +37,9 @@ MAX_RELATIVE_WIDTH = 1.0
 """Width of the headline parameter's 95 % interval, over its median, above which it is poorly determined."""
 MIN_STABLE_PROBABILITY = 0.5
 """Probability of stability over the measured range below which a simulation is likely to fail."""
+ONE_SD_EITHER_SIDE, SHARP = (0.16, 0.84), 2.0
+"""Probabilities between which a prior is twice as wide as its standard deviation; this over that of the error that all
+tests have in common, below which the prior is sharp."""
 MAX_DENSITY_AT_BOUND = 0.1
 """Marginal density at a prior bound, over its largest value, above which the bound determines the result."""
 
@@ -151,6 +154,8 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
         yield _missed_measurements(solution.model, f"{held} of {len(inside)}")
     if words := _influence_of_priors(solution):
         yield ResultWarning(words, "prior-dominates")
+    if sharp := [symbol for symbol in modulus_symbols(solution.model) if _is_sharp(solution, symbol)]:
+        yield _sharp_prior(solution.model, sharp)
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
     if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
@@ -351,6 +356,28 @@ def _influence_of_priors(solution: Solution) -> str:
     if sensitivity.likelihood < MIN_SENSITIVITY:
         return words + "more than the data do: without it the result would be another one, unless both agree."
     return words + "as much as the data do, and the two may contradict each other: see what the data say without it."
+
+
+def _is_sharp(solution: Solution, symbol: str) -> bool:
+    """Return whether a prior that was given, no bounds alone, is as sharp as the error that all tests share."""
+    model = solution.model
+    prior = model.chosen_priors.get(symbol)
+    if prior is None or isinstance(prior, Interval):
+        return False
+    low, high = prior.quantile(np.array(ONE_SD_EITHER_SIDE))
+    error = model.common_error * abs(float(solution.marginals[symbol].quantile(0.5)))
+    return bool(0.5 * (high - low) < SHARP * error)
+
+
+def _sharp_prior(model: StatisticalModel, symbols: Sequence[str]) -> ResultWarning:
+    names = " and ".join(symbols)
+    return ResultWarning(
+        f"the prior that was given for {names} is weighed against the stress as measured, and the error that all tests "
+        f"have in common ({100 * model.common_error:.2g} %) is added afterwards: the interval is wider than prior and "
+        "data allow together, and may lie beside the prior. Fit without it, and weigh both by the inverse of their "
+        "variances.",
+        "sharp-prior",
+    )
 
 
 def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:

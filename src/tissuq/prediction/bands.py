@@ -160,6 +160,7 @@ def predict_band(
     prob: float = 0.95,
     mode: str | LoadingMode | None = None,
     channel: int = 0,
+    curve: Curve | None = None,
 ) -> Band:
     """Return the median of the stress and the interval that holds ``prob`` of it, at each stretch.
 
@@ -179,6 +180,9 @@ def predict_band(
         Another loading mode than that of the data.
     channel : int
         Which of the mode's stresses, from 0, where it has several.
+    curve : Curve, optional
+        One of those that were measured, in place of mode and channel. Tests of one mode may differ in their noise, and
+        in a discrepancy that is of the stress; unless one is given, they are those of the first test of the mode.
 
     Raises
     ------
@@ -186,7 +190,7 @@ def predict_band(
         When a stretch is not positive, prob is not between 0 and 1, or the discrepancy says nothing about the mode.
     """
     options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": mode, "channel": channel}
-    return predict_bands([(1.0, solution)], stretch, (noise,), **options)[0]
+    return predict_bands([(1.0, solution)], stretch, (noise,), **options, curve=curve)[0]
 
 
 def predict_bands(
@@ -198,6 +202,7 @@ def predict_bands(
     prob: float = 0.95,
     mode: str | LoadingMode | None = None,
     channel: int = 0,
+    curve: Curve | None = None,
     errs_beyond: bool = True,
 ) -> list[Band]:
     """Return bands of a mixture of posteriors of the same data, with weights that sum to one.
@@ -206,6 +211,8 @@ def predict_bands(
     the range of the data, if asked for. All else is as for `predict_band`.
     """
     solutions = [solution for _, solution in weighted_solutions]
+    if curve is not None:
+        mode, channel = curve.mode, curve.channel
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
     probabilities = centre_and_ends(prob)
     with one_thread():
@@ -216,6 +223,7 @@ def predict_bands(
             channel,
             discrepancy=discrepancy,
             noises=noises,
+            curve=curve,
             errs_beyond=errs_beyond,
         )
         curves = [[(*map(mixture.quantile, probabilities),) for mixture in mixtures] for mixtures in blocks]
@@ -253,9 +261,13 @@ def predictive_mixtures(
     *,
     discrepancy: bool,
     noises: Sequence[bool],
+    curve: Curve | None = None,
     errs_beyond: bool = True,
 ) -> Iterator[list[Mixtures]]:
-    """Yield the predictive distributions of a stress, with noise or without, at points of a mode, some at a time."""
+    """Yield the predictive distributions of a stress, with noise or without, at points of a mode, some at a time.
+
+    They are those of the first test of the mode, or of a measured ``curve``.
+    """
     count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
     mixture = [
         (solution.model, (thinned := solution.mixture.thinned(count).merged()).weighted(weight * thinned.weights))
@@ -263,7 +275,7 @@ def predictive_mixtures(
     ]
     for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
         moments = [
-            _moments(Stress(model, components, discrepancy, errs_beyond), block, mode, channel, noises=noises)
+            _moments(Stress(model, components, discrepancy, errs_beyond), block, mode, channel, curve, noises=noises)
             for model, components in mixture
         ]
         weights, mean, *variances = (np.concatenate(arrays) for arrays in zip(*moments, strict=True))
@@ -327,8 +339,8 @@ def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: fl
     The ends of the band at condensed measurements are interpolated between the points of these.
     """
     model = solution.model
-    options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": curve.mode, "channel": curve.channel}
-    band = predict_band(solution, curve.points if model.condensed is None else model.condensed.points, **options)
+    points = curve.points if model.condensed is None else model.condensed.points
+    band = predict_band(solution, points, discrepancy=discrepancy, prob=prob, curve=curve)
     low, high = model.at_measurements(np.column_stack([band.low, band.high])).T
     return np.asarray((low <= curve.stress) & (curve.stress <= high))
 
@@ -338,6 +350,7 @@ def _moments(
     points: FloatArray,
     mode: LoadingMode,
     channel: int,
+    curve: Curve | None,
     *,
     noises: Sequence[bool],
 ) -> tuple[FloatArray, ...]:
@@ -346,7 +359,8 @@ def _moments(
     With noise they are those of a new test with its own errors.
     """
     model = stress.model
-    states = model.experiment.states_at(points, mode, channel)
+    data = model.experiment
+    states = data.states_at(points, mode, channel) if curve is None else data.states_of(curve, points)
     components, mean, of_stress = stress.at(states)
     of_stress = of_stress + (model.common_error * mean) ** 2
     if not any(noises):

@@ -211,7 +211,8 @@ def _over_noise(
     of_values = np.array([np.logaddexp.reduce(log_weights[of_value], axis=0) for of_value in rows])
     weights = np.array([components.weights[of_value].sum() for of_value in rows])
     shares /= shares.sum()
-    reweighted = shares_with_factors(np.log(values), shares, of_values - np.log(weights)[:, None])
+    log_factors = of_values - np.log(weights)[:, None]
+    reweighted = shares_with_factors(np.log(values), shares, log_factors, model.priors[NOISE_SD.symbol])
     with np.errstate(divide="ignore"):
         log_weights = log_weights + (np.log(reweighted) - of_values)[number]
     return log_weights, (reweighted - shares[:, None])[[0, -1]].max(axis=0) > MAX_GAIN_AT_END

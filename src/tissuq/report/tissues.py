@@ -11,7 +11,7 @@ from tissuq.report.coverage_figures import dots_by_row, panel_grid, shares_figur
 from tissuq.report.result import Picture, Result, Section, Table
 from tissuq.report.tables import significant
 from tissuq.validation.tissues import TissueSettings, summarise_tissues, summarise_verdicts
-from tissuq.validation.tissues.benchmark import ALL, PROBABILITIES, TARGET_HALF_WIDTH, TARGET_INSIDE
+from tissuq.validation.tissues.benchmark import ALL, PROBABILITIES, TARGET_HALF_WIDTH, TARGET_INSIDE, sets_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,9 +119,14 @@ def _sections(
         Section("How to read it", (tuple(reading),)),
     ]
     failed = [row for row in results if "failure" in row]
-    if failed:
-        texts = {f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in failed}
-        sections.append(Section("Not predicted", (tuple(sorted(texts)),)))
+    texts = sorted({f"{row['tissue']}, {row['predicted']}, {row['formulation']}: {row['failure']}" for row in failed})
+    made = {(row["protocol"], row["tissue"]) for row in results}
+    for protocol in settings.protocols:
+        if empty := [name for name in sets_of(settings) if (protocol, name) not in made]:
+            few = "too few tests, modes, specimens or measurements"
+            texts.append(f"{TESTS[protocol]}: nothing in {', '.join(empty)}, which have {few} for it.")
+    if texts:
+        sections.append(Section("Not predicted", (tuple(texts),)))
     origin = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
     return (*sections, Section("Sets", (f"{', '.join(sets)}{origin}.",)))
 

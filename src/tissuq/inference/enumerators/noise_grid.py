@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyfit
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
@@ -36,10 +38,10 @@ NEGLIGIBLE_DROP, WIDENING_DROP = 6.5, 5.0
 """By how much the log density at the ends is to lie below the largest one, and does at the least."""
 INTERVALS, MAX_NODE_STEP = 8, 0.4
 """Number of intervals of the sum, at the least, and their largest length in the logarithm of the noise."""
-MIN_SLOPE = 0.5
-"""Slope of the log density from which it falls, like the prior, towards noise that is too small to matter."""
+MAX_CHANGE = 0.1
+"""Largest change of the log likelihood from the least value of the noise down to none."""
 TAIL = 12.0
-"""Length of that fall."""
+"""Length over which a density falls in proportion to the noise, where this is too small to matter."""
 NEGLIGIBLE_SHARE = 1e-5
 """Share of the posterior, below which a value of the noise is left out."""
 POSSIBLE_PROBABILITIES, TINY = (1e-9, 1 - 1e-9), 1e-300
@@ -50,8 +52,8 @@ MAX_COMPONENTS = 3000
 """Components, about, that represent the posterior."""
 MIN_SPLINE = 4
 """Values from which a cubic spline goes through the log density, which is nearly a parabola."""
-TABLE_POINTS = 801
-"""Of the marginal of the noise."""
+TABLE_POINTS, TAIL_POINTS = 801, 201
+"""Of the marginal of the noise, between its values and beneath them."""
 DENSITY_STEPS, DENSITY_STEP = 60, 0.2
 """In which the density at the values of the noise is found from their shares, and their length: what lies beyond an end
 changes much with the density there."""
@@ -91,7 +93,7 @@ class NoiseGrid:
     def _sum(self, model: StatisticalModel, seed: int) -> Solution:
         solutions: dict[float, Solution] = {}
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
-        _, mean_sd = model.noise_of_tests
+        (_, mean_sd), prior = model.noise_of_tests, model.priors[SYMBOL]
 
         def log_weight(
             fitted_model: StatisticalModel, solve_known: Callable[[StatisticalModel], Solution], log_noise: float
@@ -102,16 +104,17 @@ class NoiseGrid:
             log_evidence = solutions[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
-            return log_evidence + float(model.priors[SYMBOL].log_density(noise_sd)) + log_noise
+            return log_evidence + float(prior.log_density(noise_sd)) + log_noise
 
         largest = float(np.abs(model.experiment.measured).max())
-        ends = _ends(model.priors[SYMBOL])
+        ends = _ends(prior)
         high = np.log(END_FACTOR * (model.fitted_errors.level or mean_sd))
         low = min(np.log((model.tolerances.resolution or MIN_NOISE_SHARE) * largest / END_FACTOR), high - MAX_STEP)
         low, high = (low, high) if ends[0] < high and low < ends[1] else ends
         initial = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
-        nodes = _nodes(*_refined(partial(log_weight, sketch, self.known_solver(ROUGH)), initial, ends))
-        logs, log_weights = _widened(partial(log_weight, model, self.known_solver(OF_SUM)), nodes, ends)
+        refined = _refined(partial(log_weight, sketch, self.known_solver(ROUGH)), initial, prior)
+        nodes = _nodes(*refined, prior)
+        logs, log_weights = _widened(partial(log_weight, model, self.known_solver(OF_SUM)), nodes, prior)
         return _joined(model, [solutions[float(value)] for value in logs], logs, log_weights, seed)
 
 
@@ -147,10 +150,9 @@ def _spaced(low: float, high: float) -> FloatArray:
     return np.linspace(low, high, 2 + int((high - low) / MAX_STEP))
 
 
-def _refined(
-    function: Callable[[float], float], initial: FloatArray, ends: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return values between two ends, between which a function is known, and its values; elsewhere it is negligible."""
+def _refined(function: Callable[[float], float], initial: FloatArray, prior: Prior) -> tuple[FloatArray, FloatArray]:
+    """Return values between which the log density is known, and its values; elsewhere it is negligible."""
+    ends = _ends(prior)
     values = {float(log_noise): function(float(log_noise)) for log_noise in initial}
     while len(values) < MAX_VALUES:
         log_noises = np.array(sorted(values))
@@ -158,9 +160,11 @@ def _refined(
         floor = logs.max() - NEGLIGIBLE_DROP
         matters = np.maximum(logs[1:], logs[:-1]) > floor
         is_rough = matters & (np.abs(np.diff(logs)) > MAX_DROP) & (np.diff(log_noises) > MIN_STEP)
+        is_rough[0] |= logs[0] > floor and log_noises[1] - log_noises[0] > 0.5 * MAX_STEP
         new = list(0.5 * (log_noises[1:] + log_noises[:-1])[is_rough])
         # Below the resolution of the tests, nothing but the prior depends on the noise: it is the end's.
-        new += [log_noises[0] - MAX_STEP] if logs[0] > floor and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP else []
+        is_end = logs[0] <= floor or _is_flat_beneath(log_noises, logs, prior)
+        new += [] if is_end else [log_noises[0] - MAX_STEP]
         new += [log_noises[-1] + MAX_STEP] if logs[-1] > floor else []
         new = [float(np.clip(log_noise, *ends)) for log_noise in new]
         if all(log_noise in values for log_noise in new):
@@ -170,45 +174,40 @@ def _refined(
     return log_noises, np.array([values[log_noise] for log_noise in log_noises])
 
 
-def _nodes(log_noises: FloatArray, logs: FloatArray) -> FloatArray:
+def _nodes(log_noises: FloatArray, logs: FloatArray, prior: Prior) -> FloatArray:
     """Return equally spaced values over the range in which a function, roughly known, is not negligible."""
-    table, density = _table(log_noises, logs, is_local=True)
+    table, density = _table(log_noises, logs, prior, is_local=True)
     matters = table[density > np.exp(-NEGLIGIBLE_DROP)]
     low, high = max(float(matters[0]), float(log_noises[0])), float(matters[-1])
     return np.linspace(low, high, 1 + max(INTERVALS, int(np.ceil((high - low) / MAX_NODE_STEP))))
 
 
-def _widened(
-    function: Callable[[float], float], log_noises: FloatArray, ends: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return equally spaced values between two ends, more where the function is not negligible, and its values."""
-    values, step = (
-        {float(log_noise): function(float(log_noise)) for log_noise in log_noises},
-        float(log_noises[1] - log_noises[0]),
-    )
+def _widened(function: Callable[[float], float], log_noises: FloatArray, prior: Prior) -> tuple[FloatArray, FloatArray]:
+    """Return equally spaced values, more where the log density is not negligible, and its values."""
+    ends, step = _ends(prior), float(log_noises[1] - log_noises[0])
+    values = {float(log_noise): function(float(log_noise)) for log_noise in log_noises}
     while len(values) < MAX_VALUES:
-        ordered = sorted(values)
-        floor, (lowest, next_lowest), last = max(values.values()) - WIDENING_DROP, ordered[:2], ordered[-1]
-        if values[last] > floor and last + step <= ends[1]:
+        ordered = np.array(sorted(values))
+        logs = np.array([values[log_noise] for log_noise in ordered])
+        (lowest, last), floor = (float(ordered[0]), float(ordered[-1])), logs.max() - WIDENING_DROP
+        if logs[-1] > floor and last + step <= ends[1]:
             values[last + step] = function(last + step)
-        elif (
-            values[lowest] > floor
-            and lowest - step >= ends[0]
-            and values[lowest] - values[next_lowest] > -MIN_SLOPE * step
-        ):
+        elif logs[0] > floor and lowest - step >= ends[0] and not _is_flat_beneath(ordered, logs, prior):
             values[lowest - step] = function(lowest - step)
         else:
             break
-    ordered = sorted(values)
-    return np.array(ordered), np.array([values[log_noise] for log_noise in ordered])
+    ordered = np.array(sorted(values))
+    return ordered, np.array([values[log_noise] for log_noise in ordered])
 
 
 def _joined(
     model: StatisticalModel, solutions: Sequence[Solution], logs: FloatArray, log_weights: FloatArray, seed: int
 ) -> Solution:
     """Return the posterior from those at values of the logarithm of the noise, and its log density at these."""
-    table, density = _table(logs, log_weights)
-    shares, local_mass = _shares(logs, table, density), _shares(logs, *_table(logs, log_weights, is_local=True)).sum()
+    prior = model.priors[SYMBOL]
+    table, density = _table(logs, log_weights, prior)
+    shares = _shares(logs, table, density)
+    local_mass = _shares(logs, *_table(logs, log_weights, prior, is_local=True)).sum()
     total = shares.sum()
     shares = shares / total
 
@@ -244,25 +243,49 @@ def _joined(
     )
 
 
-def _table(logs: FloatArray, log_weights: FloatArray, *, is_local: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Return many values of the logarithm of the noise, and their density over its largest known value."""
+def _table(
+    logs: FloatArray, log_weights: FloatArray, prior: Prior, *, is_local: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Return many values of the logarithm of the noise, and their density over its largest known value.
+
+    Beneath the known values they go on down to the least of the prior.
+    """
     from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
-    heights, slope = log_weights - log_weights.max(), (log_weights[1] - log_weights[0]) / (logs[1] - logs[0])
-    tail = logs[0] - np.linspace(TAIL, 0, TABLE_POINTS // 10, endpoint=False) if slope > MIN_SLOPE else logs[:0]
+    heights, lowest = log_weights - log_weights.max(), min(_ends(prior)[0], float(logs[0]))
+    tail = np.linspace(lowest, logs[0], TAIL_POINTS if lowest < logs[0] else 0, endpoint=False)
+    of_tail = _beneath(logs, heights, prior)(np.exp(2 * (tail - logs[0]))) + _log_prior(prior, tail)
     table = np.linspace(logs[0], logs[-1], TABLE_POINTS)
     interpolator = Akima1DInterpolator if is_local or len(logs) < MIN_SPLINE else CubicSpline
-    density = np.exp(interpolator(logs, heights)(table))
-    return np.append(tail, table), np.append(np.exp(heights[0] + slope * (tail - logs[0])), density)
+    return np.append(tail, table), np.exp(np.append(of_tail, interpolator(logs, heights)(table)))
+
+
+def _beneath(logs: FloatArray, log_weights: FloatArray, prior: Prior) -> Polynomial:
+    """Return the log likelihood beneath the least value as a parabola of the square of the noise over that.
+
+    As it is where the noise is small beside other independent errors.
+    """
+    squares, log_likelihoods = np.exp(2 * (logs[:3] - logs[0])), log_weights[:3] - _log_prior(prior, logs[:3])
+    return Polynomial(polyfit(squares, log_likelihoods, len(squares) - 1))
+
+
+def _is_flat_beneath(logs: FloatArray, log_weights: FloatArray, prior: Prior) -> bool:
+    """Return whether the log likelihood hardly changes from the least value of the noise down to none."""
+    none, least = _beneath(logs, log_weights, prior)(np.array([0.0, 1.0]))
+    return bool(abs(least - none) < MAX_CHANGE)
+
+
+def _log_prior(prior: Prior, log_noise: FloatArray) -> FloatArray:
+    """Return the log density of the logarithm of the noise under its prior."""
+    return np.asarray(prior.log_density(np.exp(log_noise)) + log_noise)
 
 
 def _shares(logs: FloatArray, table: FloatArray, density: FloatArray) -> FloatArray:
     """Return the mass that belongs to every value (k,): of the density about it, between it and its neighbours."""
-    cells = density * np.gradient(table)
-    return np.array([cells @ np.interp(table, logs, unit) for unit in np.eye(len(logs))])
+    return np.array([np.trapezoid(density * np.interp(table, logs, unit), table) for unit in np.eye(len(logs))])
 
 
-def shares_with_factors(logs: FloatArray, shares: FloatArray, log_factors: FloatArray) -> FloatArray:
+def shares_with_factors(logs: FloatArray, shares: FloatArray, log_factors: FloatArray, prior: Prior) -> FloatArray:
     """Return the shares (k, n) of values of the noise in the posterior times factors, which change much between them.
 
     What changes little has the shares of the posterior. So the density is found of which they are the shares, and
@@ -273,21 +296,24 @@ def shares_with_factors(logs: FloatArray, shares: FloatArray, log_factors: Float
     logs, shares : (k,) arrays
         Logarithms of the values, ascending, and the share of the posterior that each stands for.
     log_factors : (k, n) array
+    prior : Prior
+        Of the noise, beyond whose bounds it cannot lie.
     """
     log_density = np.log(shares)
     for _ in range(DENSITY_STEPS):
-        of_values = _masses(logs, log_density[:, None])[:, 0]
+        of_values = _masses(logs, log_density[:, None], prior)[:, 0]
         log_density = log_density + DENSITY_STEP * np.log(shares / of_values * of_values.sum())
     blocks = np.array_split(log_density[:, None] + log_factors, 1 + log_factors.shape[1] // FACTORS_AT_ONCE, axis=1)
-    masses = np.concatenate([_masses(logs, heights) for heights in blocks], axis=1)
+    masses = np.concatenate([_masses(logs, heights, prior) for heights in blocks], axis=1)
     return np.asarray(masses / masses.sum(axis=0))
 
 
-def _masses(logs: FloatArray, heights: FloatArray) -> FloatArray:
+def _masses(logs: FloatArray, heights: FloatArray, prior: Prior) -> FloatArray:
     """Return the mass (k, n) that belongs to every value, of densities with these logarithms (k, n) over their largest.
 
     Beyond the values the logarithm goes on for a few steps, as a parabola through the last three that does not open
     upwards; then, where the noise is too small to matter, it falls in proportion to the noise, which its prior leaves.
+    None lies beyond the prior's bounds.
     """
     from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
@@ -304,7 +330,8 @@ def _masses(logs: FloatArray, heights: FloatArray) -> FloatArray:
         distance = (table[is_beyond] - x[0])[:, None]
         log_density[is_beyond] = y[0] + distance * (slopes[0] + bend * (distance - (x[1] - x[0])))
     log_density[: len(tail)] = log_density[len(tail)] + (tail - table[len(tail)])[:, None]
-    cells = np.exp(log_density) * np.gradient(table)[:, None]
+    low, high = _ends(prior)
+    cells = np.exp(log_density) * (np.gradient(table) * (low <= table) * (table <= high))[:, None]
     return np.asarray(np.array([np.interp(table, logs, unit) for unit in np.eye(len(logs))]) @ cells)
 
 

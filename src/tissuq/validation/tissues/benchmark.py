@@ -171,6 +171,11 @@ class PredictionTask(TaskOfFields):
         return f"{self.tissue}, {self.protocol}, {self.formulation}"
 
 
+def sets_of(settings: TissueSettings) -> tuple[str, ...]:
+    """Return the names of the sets that are taken."""
+    return settings.sets or tuple(_corpus(settings.folder))
+
+
 def tasks_of(settings: TissueSettings) -> list[PredictionTask]:
     """Return all tasks of a benchmark, in their order.
 
@@ -185,7 +190,7 @@ def tasks_of(settings: TissueSettings) -> list[PredictionTask]:
         raise InputError(f"there is no set {', '.join(map(repr, unknown))}. The sets are: {', '.join(corpus)}.")
     tasks = [
         PredictionTask(name, protocol, number, formulation)
-        for name in settings.sets or corpus
+        for name in sets_of(settings)
         for protocol in settings.protocols
         for number in _taken(len(_splits(settings.folder, name, protocol)), settings.predictions)
         for formulation in settings.formulations
