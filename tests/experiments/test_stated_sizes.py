@@ -97,7 +97,7 @@ def test_a_size_given_for_all_is_used_and_the_specimen_it_contradicts_is_named(l
         UserWarning, match=r"^A 2: the cross-section is 10 mm2 \(as given\), but the file says 8"
     ) as found:
         first, second = tq.read_tests(FILES[layout](tmp_path), area="10 mm2")
-    texts = [str(warning.message) for warning in found if "is left out" not in str(warning.message)]
+    texts = [str(warning.message) for warning in found if "is no test" not in str(warning.message)]
     assert [place in text for text in texts] == [True]
     np.testing.assert_allclose(first.stress, STRESS, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(second.stress, 0.8 * STRESS, rtol=1e-6, atol=1e-9)
