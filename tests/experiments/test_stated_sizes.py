@@ -312,6 +312,16 @@ def test_all_sizes_that_are_missing_are_asked_for_at_once_and_the_advice_reads_t
     np.testing.assert_allclose(tq.read(path, area="10 mm2", length="20 mm").stress, STRESS, rtol=1e-6)
 
 
+def test_a_file_of_sizes_alone_says_where_sizes_are_read(tmp_path):
+    path = written(tmp_path, "specimen,width [mm],length [mm],remark\nS1,5,20,good\nS2,5.1,21,good\nS3,5.2,22,cut\n")
+    with pytest.raises(InputError, match=r"holds sizes \('width \[mm\]', 'length \[mm\]'\), which are read where"):
+        tq.read(path)
+    path = written(tmp_path, "width [mm],travel [mm],load of the cell\n5,0,0\n5.1,1,0.1\n5.2,2,0.2\n")
+    with pytest.raises(InputError, match="no column is recognised") as refusal:
+        tq.read(path)
+    assert "holds sizes" not in str(refusal.value)
+
+
 @pytest.mark.parametrize("start", ["", "# "])
 @pytest.mark.parametrize(
     ("names", "units", "values", "area"),
