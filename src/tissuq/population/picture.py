@@ -30,11 +30,16 @@ SMALL_MARKS_ABOVE = 25
 
 
 def draw_specimens(
-    drawn: Panels, summary: pd.DataFrame, specimen_summary: pd.DataFrame, units: Mapping[str, str]
+    drawn: Panels,
+    summary: pd.DataFrame,
+    specimen_summary: pd.DataFrame,
+    units: Mapping[str, str],
+    known: tuple[str, str] = ("", ""),
 ) -> None:
     """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order.
 
-    The tables are those of a `Population`, in the unit of each parameter.
+    The tables are those of a `Population`, in the unit of each parameter; ``known`` says of whom the new specimen and
+    the median are, as `patient_in_words` does.
     """
     quantities, specimens = numbers_of(summary), numbers_of(specimen_summary)
     names, first_symbol = dict.fromkeys(name for name, _ in specimens), next(iter(units))
@@ -45,8 +50,8 @@ def draw_specimens(
         new, median, complete = (
             [quantities[symbol, name][end] for end in ENDS] for name in ("new specimen", "median", "complete pooling")
         )
-        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new specimen, 95 %")
-        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population, 95 %")
+        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label=f"a new specimen{known[0]}, 95 %")
+        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label=f"median of the population{known[1]}, 95 %")
         words = "complete pooling (all as one specimen)"
         panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label=words)
         panel.plot([float(np.mean(complete))], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
