@@ -100,6 +100,14 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
     plt.close("all")
 
 
+def test_intervals_that_are_far_wider_than_medians_are_apart_end_within_the_axis():
+    rows = {name: [8.0, 7.0, 9.0] for name in ("median", "spread", "new specimen", "complete pooling")}
+    axis = drawn_axis(rows, {"a": 7.9, "b": 8.0, "c": 8.02, "d": 8.1}, 0.08, "kPa")
+    low, high = axis.get_xlim()
+    assert low < 0.92 * 7.9 < 1.08 * 8.1 < high
+    plt.close("all")
+
+
 def test_specimens_that_differ_by_orders_of_magnitude_are_on_a_logarithmic_axis():
     rows = {name: [5.0, 0.1, 200.0] for name in ("median", "spread", "new specimen", "complete pooling")}
     axis = drawn_axis(rows, {f"S{m}": m for m in (0.2, 0.9, 3.1, 10.0, 41.0, 160.0)}, 0.01, "kPa")

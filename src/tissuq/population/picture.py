@@ -98,12 +98,12 @@ def _set_axis(axis: Axes, estimates: Mapping[str, FloatArray], bands: FloatArray
 
 
 def _limits(estimates: Mapping[str, FloatArray], bands: FloatArray) -> tuple[float, float]:
-    """Return the ends of an axis for the specimens that are not far from the rest; others may run out."""
+    """Return the ends of an axis for specimens not far from the rest, and a usual interval; others may run out."""
     lower, upper = np.quantile(estimates["median"], [0.25, 0.75])
     reach = FENCE * (upper - lower)
     near = (estimates["median"] >= lower - reach) & (estimates["median"] <= upper + reach)
     ends = [estimates[f"{prefix}{end}"][near] for prefix in ("", "alone_") for end in ENDS]
-    return limits_of([estimates["median"][near]], [*ends, bands], margin=1.0)
+    return limits_of([estimates["median"][near], *map(np.median, ends)], [*ends, bands], margin=1.0)
 
 
 def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float], row: float) -> float:
