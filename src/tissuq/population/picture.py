@@ -54,7 +54,8 @@ def draw_specimens(
         panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label=f"median of the population{known[1]}, 95 %")
         words = "complete pooling (all as one specimen)"
         panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label=words)
-        panel.plot([float(np.mean(complete))], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
+        pooled = quantities[symbol, "complete pooling"]["median"]
+        panel.plot([pooled], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
         _draw_specimens(panel, estimates, small)
         _set_axis(panel, estimates, np.array([*new, *median, *complete]))
         bottom = _say_what_is_outside(panel, estimates, new, height_of_row(small))
