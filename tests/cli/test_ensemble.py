@@ -39,6 +39,7 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(done, here, model)
     assert "too few for a 95\u00a0% band" in page
     assert page.count("data:image/svg+xml") == 2
     assert "HYPERELASTIC, NEO HOOKE" in page
+    assert "curves are interpolated between them by monotone cubics" in page
 
 
 def test_what_the_fit_says_against_finite_elements_is_said_of_the_band(cli, done, here, model):

@@ -330,7 +330,10 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(done, here):
     assert float(row["hdi_low"]) < np.exp(slope) < float(row["hdi_high"])
     assert float(row["positive"]) > 0.9
     text = " ".join(said.out.split())
+    assert "Positive: the probability that the parameter is larger with it." in text
     assert "new specimen (age 80 year)" in text
+    mean_age = f"age {np.mean(AGES):.4g} year"
+    assert f"The median of the initial shear modulus in the population ({mean_age}) is" in text
     assert "beyond the specimens: age 80 year (theirs: 30 to 70)" in text
     effect, low, high = map(float, re.search(r"× ([\d.]+) per year \[([\d.]+), ([\d.]+)\]", text).groups())
     width = float(row["hdi_high"]) - float(row["hdi_low"])

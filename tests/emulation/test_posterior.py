@@ -63,6 +63,20 @@ def test_a_proportional_model_gives_the_closed_form():
 
 
 @pytest.mark.slow
+def test_what_two_samples_differ_by_is_not_owed_to_the_emulator():
+    """The share is that which the same draws have, weighted as if the emulator were exact."""
+    data, emulator = measured(ogden, TRUTH, 0.02), emulate(designed(ogden, OGDEN, 16), DEPTH)
+    for seed in range(3):
+        found = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd="unknown", emulator=emulator, seed=seed)
+        draws = found.draws(8192)
+        exact = Likelihood(found.problem, emulator, has_error=False)
+        weights = np.exp(exact.log_density(draws) - found.likelihood.log_density(draws))
+        for place, symbol in enumerate(found.problem.symbols):
+            shares = 1 - np.cov(draws[:, place], aweights=weights) / draws[:, place].var()
+            assert found.emulator_share[symbol] == pytest.approx(max(0.0, float(shares)), abs=0.002)
+
+
+@pytest.mark.slow
 def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     data = measured(ogden, TRUTH, 0.2)
     emulator = emulate(designed(ogden, OGDEN, 9), DEPTH)

@@ -317,7 +317,7 @@ def test_a_sheet_of_statistics_is_left_out_beside_a_long_test(tmp_path):
     ):
         statistics.append(row)
     book.save(path := tmp_path / "series.xlsx")
-    with pytest.warns(UserWarning, match="sheet 'Statistik' is left out: it is short"):
+    with pytest.warns(UserWarning, match="sheet 'Statistik' is no test: it is short"):
         (test,) = tq.read_tests(path)
     assert len(test) == 60
 

@@ -49,6 +49,9 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
         "AxialDisplacement(mm),ForceN",
         "displacement_mm,force_n",
         "Cross Head Travel (mm),Load (N)",
+        "Cross-head displacement [mm],Force [N]",
+        "Grip displacement [mm],Force [N]",
+        "Actuator Displacement (mm),Load (N)",
         "Position(Linear:Position) (mm),Load(Linear:Load) (N)",
         "Spostamento [mm],Forza [N]",
         "変位(mm),荷重(N)",
@@ -57,6 +60,7 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
         "Deplacement (mm),Pruefkraft (N)",
     ],
 )
+@pytest.mark.filterwarnings("error:check the column")
 def test_displacements_and_forces_are_known_by_many_names(tmp_path, head):
     path = written(tmp_path, f"Total Cycles,{head},Elapsed Cycles", 1 + 0 * L, D, N, np.arange(len(L)))
     check(path, dimensions=SIZES)

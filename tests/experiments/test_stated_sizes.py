@@ -97,7 +97,7 @@ def test_a_size_given_for_all_is_used_and_the_specimen_it_contradicts_is_named(l
         UserWarning, match=r"^A 2: the cross-section is 10 mm2 \(as given\), but the file says 8"
     ) as found:
         first, second = tq.read_tests(FILES[layout](tmp_path), area="10 mm2")
-    texts = [str(warning.message) for warning in found if "is left out" not in str(warning.message)]
+    texts = [str(warning.message) for warning in found if "is no test" not in str(warning.message)]
     assert [place in text for text in texts] == [True]
     np.testing.assert_allclose(first.stress, STRESS, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(second.stress, 0.8 * STRESS, rtol=1e-6, atol=1e-9)
@@ -310,6 +310,16 @@ def test_all_sizes_that_are_missing_are_asked_for_at_once_and_the_advice_reads_t
     assert "--length" in str(refusal.value)
     assert "--area" not in str(refusal.value)
     np.testing.assert_allclose(tq.read(path, area="10 mm2", length="20 mm").stress, STRESS, rtol=1e-6)
+
+
+def test_a_file_of_sizes_alone_says_where_sizes_are_read(tmp_path):
+    path = written(tmp_path, "specimen,width [mm],length [mm],remark\nS1,5,20,good\nS2,5.1,21,good\nS3,5.2,22,cut\n")
+    with pytest.raises(InputError, match=r"holds sizes \('width \[mm\]', 'length \[mm\]'\), which are read where"):
+        tq.read(path)
+    path = written(tmp_path, "width [mm],travel [mm],load of the cell\n5,0,0\n5.1,1,0.1\n5.2,2,0.2\n")
+    with pytest.raises(InputError, match="no column is recognised") as refusal:
+        tq.read(path)
+    assert "holds sizes" not in str(refusal.value)
 
 
 @pytest.mark.parametrize("start", ["", "# "])

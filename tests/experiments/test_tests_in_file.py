@@ -276,7 +276,7 @@ def test_sheets_are_tests_with_the_modes_that_they_say(tmp_path):
         ("tension", "uniaxial", "'tension'"),
         ("Blatt3", "simple-shear", "a column of shear"),
     ]
-    assert "sheet 'Results' is left out: no columns of a test" in tests[0].reading.warnings[-1]
+    assert "sheet 'Results' is no test: no columns of one" in tests[0].reading.warnings[-1]
     np.testing.assert_allclose(tests[1].reading.experiment.stress, MU * (ramp() - 1), rtol=1e-12)
     for test in tests:
         alone = tq.read_experiment(path, **test.options)

@@ -163,7 +163,7 @@ def test_a_workbook_kept_by_hand_is_read_with_the_sizes_of_each_specimen(tmp_pat
     book.save(tmp_path / "book.xlsx")
     with pytest.raises(InputError, match=r"sheet 'Daten', line 19, .*'Klemme nachgezogen' is not a number"):
         read_tests(tmp_path / "book.xlsx")
-    with pytest.warns(UserWarning, match="'Übersicht' is left out"):
+    with pytest.warns(UserWarning, match="'Übersicht' is no test"):
         tests = read_tests(tmp_path / "book.xlsx", leave_out="19")
     for test, factor in zip(tests, (1.0, 1.1), strict=True):
         np.testing.assert_allclose(test.stretch, stretch, rtol=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,8 +92,13 @@ def test_a_new_patient_has_the_covariates_that_are_given(found, tmp_path):
     np.testing.assert_allclose((old.new / young.new)[..., 0], factor, rtol=1e-9)
     np.testing.assert_array_equal(found.given({"age": float(np.mean(AGES))}).new, found.new)
     np.testing.assert_array_equal(old.median, found.median)
-    assert f"median of the population ({found.covariates.described({})})" in str(old.answer)
+    described = found.covariates.described({})
+    assert f"median of the population ({described})" in str(old.answer)
     assert "new specimen (age 65 year)" in str(old.answer)
+    figure, axis = plt.subplots()
+    labels = old.plot(axis).get_legend_handles_labels()[1]
+    plt.close(figure)
+    assert {"a new specimen (age 65 year), 95 %", f"median of the population ({described}), 95 %"} <= {*labels}
     band = found.new_patient([1.2], covariates={"age": 65}, discrepancy=False)
     assert band["median"][0] == pytest.approx(2 * (1.2 - 1.2**-2) * np.median(old.new), rel=1e-6)
     old.patient.save(tmp_path / "patient.nc")

@@ -86,7 +86,7 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
         "median": [0.5, 0.4, 0.6],
         "spread": [1, 0.5, 2],
         "new specimen": [0.5, 0.1, 9],
-        "complete pooling": [0.5, 0.499, 0.501],
+        "complete pooling": [0.5005, 0.499, 0.501],
     }
     axis = drawn_axis(rows, {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.45, "stiff": 30.0}, 0.1, "MPa")
     low, high = axis.get_xlim()
@@ -96,7 +96,15 @@ def test_the_axis_is_that_of_most_specimens_and_says_what_lies_outside():
     complete = [line for line in axis.lines if line.get_marker() == "D"]
     level = next(text.get_position()[1] for text in axis.texts if text.get_text().startswith("a new specimen"))
     assert axis.get_ylim()[0] < level < complete[0].get_ydata().item()  # beneath it, not on it
-    assert [line.get_xdata().item() for line in complete] == [0.5]  # seen however narrow its interval
+    assert [line.get_xdata().item() for line in complete] == [0.5005]  # seen however narrow its interval
+    plt.close("all")
+
+
+def test_intervals_that_are_far_wider_than_medians_are_apart_end_within_the_axis():
+    rows = {name: [8.0, 7.0, 9.0] for name in ("median", "spread", "new specimen", "complete pooling")}
+    axis = drawn_axis(rows, {"a": 7.9, "b": 8.0, "c": 8.02, "d": 8.1}, 0.08, "kPa")
+    low, high = axis.get_xlim()
+    assert low < 0.92 * 7.9 < 1.08 * 8.1 < high
     plt.close("all")
 
 

@@ -137,13 +137,15 @@ def _reporting(
     if "measurements" in codes:
         return worst_of(verdict, Verdict.CARE), f"{width}; see the warning about the measurements"
     model = solution.model
-    if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
+    of_common_error = model.common_error * NORMAL_HALF_WIDTH / half_width
+    if of_common_error > SET_BY_COMMON_ERROR:
         names = " and ".join(f"'{error.name}'" for error, _ in model.tolerances if error.name in ("stress", "test"))
         error = f"assumed error of load and area (tolerance {names}, {100 * model.common_error:.0f} %)"
         unnamed = " (each test without the name of one counts as a specimen)"
         spread = SPREAD + unnamed * may_be_of_one_specimen(model.experiment)
         common = spread if model.tolerances.estimand == TISSUE else error
-        return verdict, f"{width}, nearly all of it the {common}"
+        share = _number(100 * min(1.0, of_common_error**2))
+        return verdict, f"{width}, {share} % of its variance due to the {common}"
     return verdict, width + ", errors of the test not included" * (model.tolerances.estimand == AS_TESTED)
 
 

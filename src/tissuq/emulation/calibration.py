@@ -150,11 +150,13 @@ class Calibration:
     def emulator_share(self) -> dict[str, float]:
         """The share of every parameter's posterior variance that is due to the emulator's error.
 
-        One minus the variance without that error over the variance with it, but not below zero. Where the emulator's
-        error is large, it also shifts the posterior, and the share is of little meaning.
+        One minus the variance without that error over the variance with it, but not below zero, nor above
+        `error_ratio`: more is the sampling error of the two variances. Where the emulator's error is large, it also
+        shifts the posterior, and the share is of little meaning.
         """
         pairs = zip(self.marginals.items(), self.without_emulator_error.marginals.values(), strict=True)
-        return {symbol: max(0.0, 1 - (exact.sd / marginal.sd) ** 2) for (symbol, marginal), exact in pairs}
+        shares = {symbol: 1 - (exact.sd / marginal.sd) ** 2 for (symbol, marginal), exact in pairs}
+        return {symbol: min(max(0.0, share), self.error_ratio) for symbol, share in shares.items()}
 
     @cached_property
     def error_ratio(self) -> float:

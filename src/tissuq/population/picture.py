@@ -30,11 +30,16 @@ SMALL_MARKS_ABOVE = 25
 
 
 def draw_specimens(
-    drawn: Panels, summary: pd.DataFrame, specimen_summary: pd.DataFrame, units: Mapping[str, str]
+    drawn: Panels,
+    summary: pd.DataFrame,
+    specimen_summary: pd.DataFrame,
+    units: Mapping[str, str],
+    known: tuple[str, str] = ("", ""),
 ) -> None:
     """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order.
 
-    The tables are those of a `Population`, in the unit of each parameter.
+    The tables are those of a `Population`, in the unit of each parameter; ``known`` says of whom the new specimen and
+    the median are, as `patient_in_words` does.
     """
     quantities, specimens = numbers_of(summary), numbers_of(specimen_summary)
     names, first_symbol = dict.fromkeys(name for name, _ in specimens), next(iter(units))
@@ -45,11 +50,12 @@ def draw_specimens(
         new, median, complete = (
             [quantities[symbol, name][end] for end in ENDS] for name in ("new specimen", "median", "complete pooling")
         )
-        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new specimen, 95 %")
-        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population, 95 %")
+        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label=f"a new specimen{known[0]}, 95 %")
+        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label=f"median of the population{known[1]}, 95 %")
         words = "complete pooling (all as one specimen)"
         panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label=words)
-        panel.plot([float(np.mean(complete))], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
+        pooled = quantities[symbol, "complete pooling"]["median"]
+        panel.plot([pooled], [-0.55], "D", color=TRUTH, ms=4 * size)  # seen however narrow it is
         _draw_specimens(panel, estimates, small)
         _set_axis(panel, estimates, np.array([*new, *median, *complete]))
         bottom = _say_what_is_outside(panel, estimates, new, height_of_row(small))
@@ -93,12 +99,12 @@ def _set_axis(axis: Axes, estimates: Mapping[str, FloatArray], bands: FloatArray
 
 
 def _limits(estimates: Mapping[str, FloatArray], bands: FloatArray) -> tuple[float, float]:
-    """Return the ends of an axis for the specimens that are not far from the rest; others may run out."""
+    """Return the ends of an axis for specimens not far from the rest, and a usual interval; others may run out."""
     lower, upper = np.quantile(estimates["median"], [0.25, 0.75])
     reach = FENCE * (upper - lower)
     near = (estimates["median"] >= lower - reach) & (estimates["median"] <= upper + reach)
     ends = [estimates[f"{prefix}{end}"][near] for prefix in ("", "alone_") for end in ENDS]
-    return limits_of([estimates["median"][near]], [*ends, bands], margin=1.0)
+    return limits_of([estimates["median"][near], *map(np.median, ends)], [*ends, bands], margin=1.0)
 
 
 def _say_what_is_outside(axis: Axes, estimates: Mapping[str, FloatArray], new: list[float], row: float) -> float:

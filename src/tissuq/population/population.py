@@ -16,7 +16,7 @@ from tissuq.experiments.checked_arrays import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.parameters.checks import check_probability
-from tissuq.population.answer import PopulationAnswer, answer_of_population
+from tissuq.population.answer import PopulationAnswer, answer_of_population, patient_in_words
 from tissuq.population.draws import INTERVAL_COLUMNS, PopulationDraws, effect_table, interval, labelled_arrays
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
@@ -261,7 +261,8 @@ class Population(PopulationDraws):
     def draw(self, drawn: Panels, unit: StressUnit) -> None:
         """Draw `plot` on panels, one a parameter as far as there are panels, with stresses in a unit."""
         units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols[: len(drawn.axes)]}
-        draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units)
+        known = patient_in_words(self), patient_in_words(self, {})
+        draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units, known)
 
     def _repr_html_(self) -> str:
         """Return the population's parameters in the unit of the measurements as a table, which notebooks show."""

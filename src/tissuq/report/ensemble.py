@@ -287,8 +287,8 @@ def _sections(
         f"{prepared.solver.name}, `{prepared.solver.command or prepared.solver.template}`; {result.seconds:.0f} s in "
         "all.",
         *prepared.card_warnings,
-        "Where the solver chose its increments draw by draw, curves are interpolated linearly between them; values at "
-        "the end are its own.",
+        "Where the solver chose its increments draw by draw, curves are interpolated between them by monotone cubics; "
+        "values at the end are its own.",
         f"The error of the model's {'' if is_meshed else 'mesh, of its '}loads and of its supports is in no number "
         f"here.{stored}",
         *[_of_mesh(study, bands)] * is_meshed,

@@ -303,7 +303,8 @@ def _lead(study: PopulationStudy, answer: PopulationAnswer) -> str:
         for name, ratio in far_specimens(study.population).items()
     )
     return (
-        f"The median of {quantity} in the population is {median.text}; for a specimen that has not been measured"
-        f"{patient_in_words(study.population)} it is {new.range} {new.unit} (95 %). Taking all measurements for those "
-        f"of one specimen would say {complete.range} {new.unit}, which is no range of specimens.{f' {far}' * bool(far)}"
+        f"The median of {quantity} in the population{patient_in_words(study.population, {})} is {median.text}; for a "
+        f"specimen that has not been measured{patient_in_words(study.population)} it is {new.range} {new.unit} (95 %). "
+        f"Taking all measurements for those of one specimen would say {complete.range} {new.unit}, which is no range "
+        f"of specimens.{f' {far}' * bool(far)}"
     )

@@ -11,7 +11,7 @@ from tissuq.drawing import pieces
 from tissuq.drawing.panels import on_figure
 from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
 from tissuq.experiments.units import StressUnit
-from tissuq.population.answer import Measured, headline
+from tissuq.population.answer import Measured, headline, patient_in_words
 from tissuq.population.picture import draw_specimens, height_of
 from tissuq.prediction.bands import Band
 
@@ -34,7 +34,8 @@ def headline_figure(population: Population, unit: StressUnit) -> Figure:
     unit_name = population.unit_of(symbol, unit).name
     with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
         drawn = on_figure(figure, 1, 1)
-        draw_specimens(drawn, summary, specimens, {symbol: unit_name})
+        known = patient_in_words(population), patient_in_words(population, {})
+        draw_specimens(drawn, summary, specimens, {symbol: unit_name}, known)
         drawn.axes[0].set_xlabel(f"{words} [{unit_name}]" if unit_name else words)
     return figure
 

@@ -103,7 +103,7 @@ def effects_of_covariates(study: PopulationStudy) -> tuple[Table, ...]:
             HEADERS_OF_EFFECTS, rows, "Effects of covariates", (1, 2),
             f"Medians of the population are at {population.covariates.described({})}; a new specimen has "
             f"{population.covariates.described(population.patient_covariates)}. Of the variance between specimens: "
-            "the share that all covariates explain.",
+            "the share that all covariates explain. Positive: the probability that the parameter is larger with it.",
         ),
     )  # fmt: skip
 

@@ -352,8 +352,9 @@ def _carried_out(
             losses += 1
             if losses == MAX_LOSSES or not isinstance(pool, WorkerProcesses):
                 raise InputError(
-                    f"worker processes were killed {losses} times in a row, perhaps for want of memory. What is done "
-                    "is kept: the same command goes on from there; give it fewer --workers."
+                    f"worker processes were killed {losses} times in a row, perhaps for want of memory, or ended as "
+                    "they read a script whose calls do not stand beneath 'if __name__ == \"__main__\":'. What is done "
+                    "is kept: the same command or script goes on from there; give it fewer workers."
                 ) from error
             pool.replace()
 

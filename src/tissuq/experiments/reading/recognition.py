@@ -163,6 +163,7 @@ def recognise(
     if not columns:
         by_role = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
         hint = by_role or _of_other_quantities(table, roles) or _several_hint(table, contents, roles)
+        hint = hint or _sizes_hint(table)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
         of_roles = (
@@ -214,6 +215,17 @@ def _of_other_quantities(table: Table, roles: Sequence[str]) -> str:
                 f'give --column {role}="{name}".'
             )
     return "".join(texts)
+
+
+def _sizes_hint(table: Table) -> str:
+    """Return where sizes are read, of a table that holds some and nothing else that has a unit."""
+    sizes = [table.label(column) for column, name in enumerate(table.quantities) if dimensions_named(name)]
+    if not sizes or any(_by_unit(table, table.quantities).keys() - {"", "time"}):
+        return ""
+    return (
+        f" It holds sizes ({', '.join(sizes)}), which are read where the measurements stand: in lines above their "
+        "table ('Width : 5 mm'), in columns of it, or in another sheet of their workbook."
+    )
 
 
 def _stress_hint(table: Table, contents: Contents) -> str:

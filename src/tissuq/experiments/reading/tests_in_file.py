@@ -180,7 +180,7 @@ def find_tests_in_file(
             rows = only_rows(table, columns_only(table, options.get("only")))
             of_table = _side_by_side(rows, path, selection, names)
         except InputError as error:
-            refused.append((table, error, MIN_SHARE_OF_TEST, "no columns of a test are recognised in it."))
+            refused.append((table, error, MIN_SHARE_OF_TEST, "no columns of one are recognised in it."))
             continue
         try:
             tests += [
@@ -189,7 +189,7 @@ def find_tests_in_file(
                 for test in _of_one_table(rows, path, selection, names, columns, is_only_test=not is_one_of_several)
             ]
         except InputError as error:
-            refused.append((table, error, 1 / LENGTH_RATIO, "it is short, and cannot be read as a test."))
+            refused.append((table, error, 1 / LENGTH_RATIO, "it is short, and cannot be read as one."))
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
     refused.sort(key=lambda item: -item[2] if tests else -len(item[0].rows))
     for table, why, share, _ in refused:
@@ -205,7 +205,7 @@ def find_tests_in_file(
     tests = [test for test, refusal in zip(tests, refusals, strict=True) if not refusal]
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
-    notes += [f"{table.file} is left out: {what}" for table, _, _, what in refused]
+    notes += [f"{table.file} is no test: {what}" for table, _, _, what in refused]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
 
 

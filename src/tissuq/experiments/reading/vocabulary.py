@@ -110,7 +110,9 @@ ROLES = {
     "displacement": names_of(
         "displacement, disp, compression, uzama, yer değiştirme, "
         "axial displacement, compressive displacement, extension, tensile extension, "
-        "compressive extension, crosshead, crosshead displacement, extension from preload, weg, standardweg, "
+        "compressive extension, crosshead, crosshead displacement, cross head displacement, crosshead extension, "
+        "grip displacement, clamp displacement, jaw displacement, actuator displacement, machine displacement, "
+        "extension from preload, weg, standardweg, "
         "traversenweg, verfahrweg, kolbenweg, position, "
         "axial position, crosshead position, crosshead travel, cross head travel, stroke, travel, traverse, "
         "déplacement, allongement, desplazamiento, "
