@@ -34,11 +34,11 @@ def draw_specimens(
     summary: pd.DataFrame,
     specimen_summary: pd.DataFrame,
     units: Mapping[str, str],
-    known: tuple[str, str] = ("", ""),
+    whose: tuple[str, str] = ("", ""),
 ) -> None:
     """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order.
 
-    The tables are those of a `Population`, in the unit of each parameter; ``known`` says of whom the new specimen and
+    The tables are those of a `Population`, in the unit of each parameter; ``whose`` says of whom the new specimen and
     the median are, as `patient_in_words` does.
     """
     quantities, specimens = numbers_of(summary), numbers_of(specimen_summary)
@@ -50,8 +50,8 @@ def draw_specimens(
         new, median, complete = (
             [quantities[symbol, name][end] for end in ENDS] for name in ("new specimen", "median", "complete pooling")
         )
-        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label=f"a new specimen{known[0]}, 95 %")
-        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label=f"median of the population{known[1]}, 95 %")
+        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label=f"a new specimen{whose[0]}, 95 %")
+        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label=f"median of the population{whose[1]}, 95 %")
         words = "complete pooling (all as one specimen)"
         panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label=words)
         pooled = quantities[symbol, "complete pooling"]["median"]

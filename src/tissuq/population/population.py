@@ -261,8 +261,8 @@ class Population(PopulationDraws):
     def draw(self, drawn: Panels, unit: StressUnit) -> None:
         """Draw `plot` on panels, one a parameter as far as there are panels, with stresses in a unit."""
         units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols[: len(drawn.axes)]}
-        known = patient_in_words(self), patient_in_words(self, {})
-        draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units, known)
+        whose = patient_in_words(self), patient_in_words(self, {})
+        draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units, whose)
 
     def _repr_html_(self) -> str:
         """Return the population's parameters in the unit of the measurements as a table, which notebooks show."""

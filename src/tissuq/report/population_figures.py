@@ -34,8 +34,8 @@ def headline_figure(population: Population, unit: StressUnit) -> Figure:
     unit_name = population.unit_of(symbol, unit).name
     with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
         drawn = on_figure(figure, 1, 1)
-        known = patient_in_words(population), patient_in_words(population, {})
-        draw_specimens(drawn, summary, specimens, {symbol: unit_name}, known)
+        whose = patient_in_words(population), patient_in_words(population, {})
+        draw_specimens(drawn, summary, specimens, {symbol: unit_name}, whose)
         drawn.axes[0].set_xlabel(f"{words} [{unit_name}]" if unit_name else words)
     return figure
 
