@@ -136,6 +136,23 @@ def test_a_process_beside_the_model_agrees_with_the_exact_posterior_on_a_dense_g
         assert found.marginals[symbol].sd == pytest.approx(sd, rel=0.1)
 
 
+def test_parameters_that_act_by_their_product_lie_all_along_its_hyperbola():
+    """Of a b = B under uniform priors the density of a is as 1 / a; half of the hyperbola had been missed."""
+
+    def force(parameters, depth):
+        return parameters["a"] * parameters["b"] * depth * np.exp(parameters["c"] * depth)
+
+    depth, truth = np.linspace(0.1, 1, 12), {"a": 1.0, "b": 1.0, "c": 0.5}
+    data = force(truth, depth) + 0.003 * np.random.default_rng(0).standard_normal(12)
+    priors = dict.fromkeys(truth, tq.Uniform(0.2, 3.0))
+    found = tq.calibrate(depth, data, force, priors, discrepancy="none", noise_sd=0.003, runs=40)
+    low, high = 1 / 3.0, 3.0
+    mean, square = ((high**power - low**power) / power / np.log(high / low) for power in (1, 2))
+    for symbol in ("a", "b"):
+        assert found.marginals[symbol].mean == pytest.approx(mean, abs=0.05)
+        assert found.marginals[symbol].sd == pytest.approx(np.sqrt(square - mean**2), abs=0.05)
+
+
 @pytest.mark.slow
 def test_importance_sampling_and_nuts_agree():
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)

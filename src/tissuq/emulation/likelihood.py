@@ -22,7 +22,7 @@ from tissuq.parameters.priors import Prior
 
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
-BLOCK_SIZE = 256
+BLOCK_SIZE = 64
 """Number of parameter settings computed at once, which bounds the memory."""
 ROUNDING_SHARE = 1e-9
 """Smallest standard deviation as a share of the largest measurement, so that no covariance is singular."""

@@ -15,13 +15,14 @@ from tissuq.emulation.likelihood import Likelihood, log_posterior
 from tissuq.emulation.problem import Method
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
+from tissuq.inference.enumerators.ridges import around_peaks
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.proposals import adapted, fitted_mixture, weighted_points
+from tissuq.inference.proposals import fitted_mixture, weighted_points
 from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, effective, log_normal, sobol_rounds, systematic
 from tissuq.parameters.priors import Prior
 
-SEARCH_POINTS, ROUND_POINTS, ROUNDS, MAX_ROUNDS = 512, 1024, 16, 32
-"""Points of a search round; points of a sampling round, the number of these, and where it does not suffice, at most."""
+ROUND_POINTS, ROUNDS, MAX_ROUNDS = 1024, 16, 64
+"""Points of a round, the number of rounds, and where that does not suffice, at most."""
 MIN_EFFECTIVE_POINTS = 800
 """Smallest effective number of points of a converged posterior."""
 MAX_POINT_WEIGHT = 0.02
@@ -135,15 +136,12 @@ def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
 def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, FloatArray]:
     """Return scores (N, D) and the logarithms of their weights (N,), over the mixture of all rounds' proposals.
 
-    Where the emulator is uncertain every outcome is possible, and a search may end there. So there are two searches,
-    one of them as if the emulator were exact.
+    The first rounds lie around peaks and along ridges. Where the emulator is uncertain every outcome is possible, and a
+    search for these may end there. So there are two, one of them as if the emulator were exact.
     """
     exact = Likelihood(likelihood.problem, likelihood.emulator, has_error=False)
     size = len(likelihood.problem.symbols)
-    searched = [
-        [(1.0, adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal)]
-        for candidate in (exact, likelihood)
-    ]
+    searched = [around_peaks(partial(_log_target, candidate), size) for candidate in (exact, likelihood)]
     uniforms = islice(sobol_rounds(size, ROUND_POINTS, [seed, 43]), MAX_ROUNDS)
     rounds = weighted_points(partial(_log_target, likelihood), searched, uniforms, fitted_mixture)
     for number, weighted in enumerate(rounds, 1):

@@ -39,8 +39,13 @@ class Proposal:
         """Return one with the mean and the covariance of points (N, d) with weights (N,), which sum to one."""
         mean = weights @ points
         centred = points - mean
-        covariance = (weights[:, None] * centred).T @ centred + 1e-12 * np.eye(len(mean))
-        return cls(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
+        return cls.of_covariance(mean, (weights[:, None] * centred).T @ centred)
+
+    @classmethod
+    def of_covariance(cls, mean: FloatArray, covariance: FloatArray) -> Proposal:
+        """Return one with a mean (d,) and a covariance (d, d), no narrower than a millionth along any axis."""
+        root = np.linalg.cholesky(covariance + 1e-12 * np.eye(len(mean)))
+        return cls(mean, np.asarray(root, dtype=np.float64))
 
     def points(self, uniforms: FloatArray) -> FloatArray:
         """Return the points (N, d) to which evenly spread points (N, d) of the unit cube lead."""

@@ -23,6 +23,8 @@ RELEVANT_LOG_DROP = 8.0
 MAX_NEWTON_STEPS = 25
 COORDINATE_TOLERANCE = 0.02
 """Change of a coordinate at which the search for a mode ends."""
+LEAST_CURVATURE = 0.04
+"""Of a log density: no scale beyond five e-folds or units."""
 DIFFERENCE_STEP = 1e-3
 """Of the finite differences, in a coordinate."""
 REACH_E_FOLDS = 20.0
@@ -209,10 +211,10 @@ def _derivatives(evaluate: LogDensity, point: FloatArray) -> tuple[FloatArray, F
 
 
 def _positive(curvature: FloatArray) -> FloatArray:
-    """Return curvatures with eigenvalues of at least a twenty-fifth: no scale beyond five e-folds or units."""
+    """Return curvatures with eigenvalues of at least the least one."""
     is_finite = np.asarray(np.isfinite(curvature).all(axis=(-2, -1)))[..., None, None]
     values, vectors = np.linalg.eigh(np.where(is_finite, curvature, np.eye(curvature.shape[-1])))
-    return np.asarray((vectors * np.maximum(values, 0.04)[..., None, :]) @ vectors.swapaxes(-1, -2))
+    return np.asarray((vectors * np.maximum(values, LEAST_CURVATURE)[..., None, :]) @ vectors.swapaxes(-1, -2))
 
 
 @dataclass(frozen=True, eq=False)
