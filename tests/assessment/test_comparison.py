@@ -79,7 +79,7 @@ def test_leave_one_out_is_that_of_refitting(fits, name):
         parts = solution.mixture
         states = solution.model.experiment.states_at(np.array([STRETCH[out]]))
         mean, variance = stress_moments(solution.model, parts, states)
-        variance = variance + variance_of_noise(solution.model, parts, states, mean)
+        variance = variance + variance_of_noise(solution.model, parts, solution.model.relative_noise(states), mean)
         each = norm.pdf(DATA.stress[out], mean[:, 0], np.sqrt(variance[:, 0]))
         density += float(np.log(parts.weights @ each))
     assert tq.compare({name: fits[name], "none": fits["none"]}).loc[name, "elpd"] == pytest.approx(density, abs=0.7)

@@ -330,6 +330,22 @@ def test_the_noise_has_the_marginal_of_its_dense_grid():
     assert found.quantile([0.025, 0.975]) == pytest.approx([low, high], rel=2e-2)
 
 
+def test_the_noise_of_few_data_has_the_marginal_of_fits_with_known_noise():
+    # Bounds cut C10 here, so that few of the very different points of all energies stand for the posterior.
+    stretch = [0.75, 0.85, 0.95, 1.1, 1.25, 1.4, 1.6]
+    data = tq.simulate("yeoh", {"C10": 0.4, "C20": 0.03, "C30": 0.002}, stretch, noise_sd=0.05, seed=0)
+    priors = {"C10": tq.Uniform(0, 50)}
+    unknown = priors | {"noise_sd": tq.Uniform(0, 1.2)}
+    found = tq.fit(data, priors=unknown, tolerances="as-tested", noise="independent").marginals["noise_sd"]
+    noise = np.exp(np.arange(np.log(0.004), np.log(1.2), 0.15))
+    evidences = np.array([tq.fit(data, noise_sd=float(sd), priors=priors).log_evidence for sd in noise])
+    weights = np.exp(evidences - evidences.max()) * noise
+    weights /= weights.sum()
+    assert found.mean == pytest.approx(weights @ noise, rel=1e-2)
+    ends = np.exp(np.interp([0.025, 0.975], np.cumsum(weights), np.log(noise) + 0.075))
+    assert found.quantile([0.025, 0.975]) == pytest.approx(ends, rel=3e-2)
+
+
 UNUSUAL = {
     "a tenth of a percent of strain": (np.linspace(0.999, 1.001, 20), 0.01),
     "a wide range": (np.linspace(0.2, 8, 40), 0.1),

@@ -88,7 +88,7 @@ def test_moments_at_new_stretches_are_those_of_dense_conditioning(discrepancy, n
     model = model_of(discrepancy, noise)
     states = model.experiment.states_at(NEW)
     mean, variance = stress_moments(model, components(model), states)
-    variance = variance + noisy * variance_of_noise(model, components(model), states, mean)
+    variance = variance + noisy * variance_of_noise(model, components(model), 1.0, mean)
     expected, spread = conditioned(discrepancy, noise, NEW)
     sd2, own = white(discrepancy, noise, np.abs(expected))
     np.testing.assert_allclose(mean[0], expected, rtol=1e-9, atol=1e-9)

@@ -30,7 +30,7 @@ def refitted(name, noise_sd, priors, out):
     parts = solution.mixture
     states = solution.model.experiment.states_at(STRETCH[[out]])
     mean, variance = stress_moments(solution.model, parts, states)
-    variance = variance + variance_of_noise(solution.model, parts, states, mean)
+    variance = variance + variance_of_noise(solution.model, parts, solution.model.relative_noise(states), mean)
     return np.log(parts.weights @ norm.pdf(DATA.stress[out], mean[:, 0], np.sqrt(variance[:, 0])))
 
 

@@ -50,7 +50,7 @@ def test_a_conditioned_process_agrees_with_dense_linear_algebra(noise):
     components = GaussianMixture(np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]]))
     states = model.experiment.states_at(NEW)
     mean, variance = stress_moments(model, components, states)
-    variance = variance + noise * variance_of_noise(model, components, states, mean)
+    variance = variance + noise * variance_of_noise(model, components, model.relative_noise(states), mean)
 
     joint = kernel(STRETCH, STRETCH, c, psi) + 0.49 * np.outer(x(STRETCH), x(STRETCH)) + 0.04 * np.eye(14)
     cross = kernel(NEW, STRETCH, c, psi) + 0.49 * np.outer(x(NEW), x(STRETCH))
@@ -178,3 +178,29 @@ def test_every_test_of_one_mode_is_compared_with_the_band_of_its_own_noise_and_e
         assert np.array_equal(posterior.inside_bands()[tests.index(test)], inside)
         assert inside.mean() > 0.85
     assert "measurements are inside" not in " ".join(posterior.warnings)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (2, 1, 0)])
+def test_a_new_test_has_the_geometric_mean_of_the_noise_of_its_mode_whatever_the_order(order):
+    stretch, sds = np.linspace(0.85, 1.4, 40), (0.004, 0.05, 0.3)
+    modes = "uniaxial", "uniaxial", "planar"
+    tests = [
+        tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=sd, mode=mode, seed=number)
+        for number, (sd, mode) in enumerate(zip(sds, modes, strict=True))
+    ]
+    noises = [sds[number] for number in order]
+    posterior = tq.fit([tests[number] for number in order], discrepancy="none", noise_sd=noises, tolerances="as-tested")
+    for mode, expected in (
+        ("uniaxial", 0.004 * 0.05),
+        ("planar", 0.3**2),
+        ("equibiaxial", (0.004 * 0.05 * 0.3) ** (2 / 3)),
+    ):
+        half_widths = [
+            np.diff(posterior.predict([1.2], mode=mode, noise=noise)[["low", "high"]].to_numpy()).item() / 2
+            for noise in (True, False)
+        ]
+        assert half_widths[0] ** 2 - half_widths[1] ** 2 == pytest.approx(1.96**2 * expected, rel=1e-3)
+    designed = posterior.design(["uniaxial 1:1.4 20"]).query("~is_repeat").iloc[0]
+    path = np.linspace(1, 1.4, 20)
+    more = (4 / designed["sd_after"] ** 2 - 4 / designed["sd_now"] ** 2) / (4 * (path - path**-2) ** 2).sum()
+    assert more == pytest.approx(1 / (0.004 * 0.05), rel=1e-3)  # the modulus is 2 C10

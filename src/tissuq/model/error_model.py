@@ -11,7 +11,7 @@ import numpy as np
 
 from tissuq.arrays import BoolArray, FloatArray
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import States
+from tissuq.experiments.modes import LoadingMode, States
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.measurement_errors import ErrorPoints, Shared
 from tissuq.model.noise import Noise, stress_level
@@ -213,6 +213,17 @@ class ErrorModel:
         noise_sd, mean_sd = self.noise_of_tests
         of_curves = np.repeat(noise_sd / mean_sd, [len(test.curves) for test in self.experiment.tests])
         return np.append(of_curves, 1.0)[states.curve]  # the last one is of what no test has measured
+
+    def noise_of_new_test(self, mode: LoadingMode) -> float:
+        """Return the noise of a new test in a mode over noise_sd: the geometric mean of that of the tests in it.
+
+        One, which is the geometric mean of all, where no test is in that mode.
+        """
+        if len(self.experiment.tests) == 1:
+            return 1.0
+        noise_sd, mean_sd = self.noise_of_tests
+        of_mode = noise_sd[[test.mode == mode for test in self.experiment.tests]]
+        return float(np.exp(np.log(of_mode / mean_sd).mean())) if len(of_mode) else 1.0
 
     @property
     def common_error(self) -> float:

@@ -63,9 +63,16 @@ class Noise(ABC):
     def of_tests(self, experiment: Experiment) -> FloatArray:
         """Return the noise (tests,) of each of several tests as known or about, MPa; their ratios are taken as known.
 
-        Here by the scatter of each test about a smooth curve.
+        Here by the scatter of each test about a smooth curve, and half a percent of its stress at least. That of a test
+        that tells none, as it has few points or two controls, is as large beside its stress as the geometric mean of
+        the others'.
         """
-        return np.array([_scatter_of(test) for test in experiment.tests])
+        sizes = np.array([float(np.sqrt((test.stress**2).mean())) for test in experiment.tests])
+        smallest = MIN_RELATIVE_SCATTER * sizes
+        scatters = np.maximum([_scatter_of(test) for test in experiment.tests], smallest)
+        is_told = scatters > 0
+        usual = np.exp(np.log(scatters[is_told] / sizes[is_told]).mean()) if is_told.any() else MIN_RELATIVE_SCATTER
+        return np.where(is_told, scatters, usual * sizes)
 
 
 @dataclass(frozen=True)
@@ -235,8 +242,7 @@ def _level_of(test: Experiment) -> FloatArray:
 
 
 def _scatter_of(test: Experiment) -> float:
-    """Return the scatter (MPa) of a test about a smooth curve, and half a percent of its stress at least."""
-    smallest = MIN_RELATIVE_SCATTER * float(np.sqrt((test.stress**2).mean()))
-    if test.stretch.ndim > 1:
-        return smallest
-    return max(smallest, *(scatter(curve.abscissa, curve.stress) or smallest for curve in test.curves))
+    """Return the scatter (MPa) of a test about a smooth curve; nan where it tells none."""
+    curves = () if test.stretch.ndim > 1 else test.curves
+    told = [found for curve in curves if (found := scatter(curve.abscissa, curve.stress)) is not None]
+    return max(told, default=np.nan)

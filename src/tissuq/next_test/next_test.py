@@ -218,7 +218,7 @@ class NextTest:
         target_mean, target_root = self._targets(components, mean, root)
         mean, root = mean[:, :count], np.concatenate([root[:, :count], np.zeros((*mean[:, :count].shape, 1))], axis=2)
         curve = components.weights @ mean / components.weights.sum()
-        noise_sd = self._noise(components, candidate, points, curve)
+        noise_sd = self._noise(components, candidate, curve)
         if self.specimen == "other":
             test = self._error_points(components, candidate, points, curve)
             columns = list(self._errors_of_specimens(test, mean, target_mean - self._offsets, candidate.tests))
@@ -240,9 +240,7 @@ class NextTest:
         weights = components.weights / components.weights.sum()
         return ErrorPoints(candidate.mode, points, curve, np.einsum("m,mgc->gc", weights, slopes))
 
-    def _noise(
-        self, components: GaussianMixture, candidate: Candidate, points: FloatArray, curve: FloatArray
-    ) -> FloatArray:
+    def _noise(self, components: GaussianMixture, candidate: Candidate, curve: FloatArray) -> FloatArray:
         """Return the sd (M, n) of all that is independent from measurement to measurement.
 
         Errors that are correlated from one to the next, if the test is sampled as those of the data, tell as little as
@@ -250,8 +248,7 @@ class NextTest:
         """
         model = self.model
         values = values_by_symbol(model, components.settings)
-        states = states_of(model, [(candidate.mode, points)])
-        variance = model.noise_variance(values, np.abs(curve)) * model.relative_noise(states) ** 2
+        variance = model.noise_variance(values, np.abs(curve)) * model.noise_of_new_test(candidate.mode) ** 2
         variance = variance * widening_of_lag(model.fitted_errors.lag or 0.0) ** 2
         total = variance + _scatter(model, components)[:, None] ** 2
         return np.asarray(np.sqrt(np.broadcast_to(total, (len(components.weights), len(curve)))))

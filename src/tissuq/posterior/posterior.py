@@ -348,8 +348,9 @@ class Posterior(PosteriorPlots):
         prob : float
             Probability between low and high, equal tails.
         mode : str or LoadingMode, optional
-            Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy. Of
-            several tests of a mode that differ in noise, or in a discrepancy of the stress, the first one counts.
+            Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy. A
+            new measurement has the geometric mean of the noise of the tests of that mode, or of all where none is of
+            it; of a discrepancy of the stress, which is another in each of several tests, the first one counts.
         channel : int
             Which of the mode's stresses, from 0, where it has several.
         stress_type : str

@@ -182,7 +182,8 @@ def predict_band(
         Which of the mode's stresses, from 0, where it has several.
     curve : Curve, optional
         One of those that were measured, in place of mode and channel. Tests of one mode may differ in their noise, and
-        in a discrepancy that is of the stress; unless one is given, they are those of the first test of the mode.
+        in a discrepancy that is of the stress; unless one is given, the noise is the geometric mean of that of the
+        tests of the mode, or of all where none is of it, and the discrepancy that of the first of them.
 
     Raises
     ------
@@ -266,7 +267,7 @@ def predictive_mixtures(
 ) -> Iterator[list[Mixtures]]:
     """Yield the predictive distributions of a stress, with noise or without, at points of a mode, some at a time.
 
-    They are those of the first test of the mode, or of a measured ``curve``.
+    They are those of a new test, or of a measured ``curve``, as `predict_band` says.
     """
     count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
     mixture = [
@@ -365,7 +366,8 @@ def _moments(
     of_stress = of_stress + (model.common_error * mean) ** 2
     if not any(noises):
         return components.weights, mean, *(of_stress for _ in noises)
-    of_measurements = of_stress + variance_of_noise(model, components, states, mean)
+    relative = model.noise_of_new_test(mode) if curve is None else model.relative_noise(states)
+    of_measurements = of_stress + variance_of_noise(model, components, relative, mean)
     if model.tolerances:
         slope = stress.slopes(states, mean) if model.tolerances.need_slope else 0.0
         largest = float(np.abs(model.experiment.measured).max())  # as the band is one at each point by itself

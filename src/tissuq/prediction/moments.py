@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -171,11 +172,11 @@ def stress_moments(
 
 
 def variance_of_noise(
-    model: StatisticalModel, components: GaussianMixture, states: States, mean: FloatArray
+    model: StatisticalModel, components: GaussianMixture, relative: Any, mean: FloatArray
 ) -> FloatArray:
-    """Return the variance of the noise at states (g,) where the mean stress is known (M, g), for every component."""
+    """Return the variance (M, g) of a noise that is ``relative`` to noise_sd where the mean stress is (M, g)."""
     values = values_by_symbol(model, components.settings)
-    return np.asarray(model.noise_variance(values, np.abs(mean)) * model.relative_noise(states) ** 2)
+    return np.asarray(model.noise_variance(values, np.abs(mean)) * relative**2)
 
 
 def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:

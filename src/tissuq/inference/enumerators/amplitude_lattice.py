@@ -290,7 +290,9 @@ class _EnergySums:
     def _noise_marginal(self) -> Marginal:
         """Return the marginal of the noise from its densities given the rest, at some of the points."""
         is_pulled = self._truncated.is_cut or self._priors.is_gaussian
-        representatives = systematic(self._weights[None], MARGINAL_POINTS // (PULLED_DIVISOR if is_pulled else 1))[0]
+        order = np.argsort(self._points.misfit, kind="stable")  # in which neighbours tell nearly the same noise
+        count = MARGINAL_POINTS // (PULLED_DIVISOR if is_pulled else 1)
+        representatives = order[systematic(self._weights[order][None], count)[0]]
         points, freedom = self._points[representatives], self.model.experiment.size - len(self.model.linear)
         logs = np.log(noise_grid(self.model, points, freedom, MARGINAL_NOISES // (2 if is_pulled else 1)))
         noise_sd, step = np.exp(logs), logs[1] - logs[0]
