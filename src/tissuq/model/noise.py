@@ -71,8 +71,8 @@ class Noise(ABC):
         smallest = MIN_RELATIVE_SCATTER * sizes
         scatters = np.maximum([_scatter_of(test) for test in experiment.tests], smallest)
         is_told = scatters > 0
-        usual = np.exp(np.log(scatters[is_told] / sizes[is_told]).mean()) if is_told.any() else MIN_RELATIVE_SCATTER
-        return np.where(is_told, scatters, usual * sizes)
+        typical = np.exp(np.log(scatters[is_told] / sizes[is_told]).mean()) if is_told.any() else MIN_RELATIVE_SCATTER
+        return np.where(is_told, scatters, typical * sizes)
 
 
 @dataclass(frozen=True)
