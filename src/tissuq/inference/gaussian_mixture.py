@@ -123,6 +123,14 @@ class GaussianMixture:
         """Return the same components with other weights (M,)."""
         return replace(self, weights=weights)
 
+    def along_main_axis(self) -> GaussianMixture:
+        """Return the same components along the first principal axis of settings and means, each over its sd."""
+        values = np.hstack([self.settings, self.mean])
+        sd = values.std(axis=0)
+        scores = (values - values.mean(axis=0))[:, sd > 0] / sd[sd > 0]
+        axis = np.linalg.eigh(scores.T @ scores)[1][:, -1:].sum(axis=1)
+        return self[np.argsort(scores @ axis, kind="stable")]
+
     def thinned(self, count: int) -> GaussianMixture:
         """Return few components that stand for all, their weights summing to one.
 
