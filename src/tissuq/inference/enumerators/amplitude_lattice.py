@@ -21,7 +21,7 @@ from tissuq.inference.box import NEGLIGIBLE_MASS, Boxes
 from tissuq.inference.enumerators.amplitudes import (
     NEGLIGIBLE_SHARE,
     Points,
-    log_prior_of_amplitude,
+    log_prior_of_log,
     log_prior_of_noise,
     noise_grid,
 )
@@ -303,7 +303,7 @@ class _EnergySums:
         for index, symbol in enumerate(self.model.energy_symbols):
             is_concerned = points.amplitudes[:, index] > 0
             ratios = points.amplitudes[is_concerned, index] / points.noise_sd[is_concerned]
-            log_density[is_concerned] += log_prior_of_amplitude(self.model.priors[symbol], ratios[:, None] * noise_sd)
+            log_density[is_concerned] += log_prior_of_log(self.model.priors[symbol], ratios[:, None] * noise_sd)
         if is_pulled:
             mean, root = (np.repeat(bare[representatives], len(noise_sd), axis=0) for bare in self._bare)
             root = root * np.tile(noise_sd, len(representatives))[:, None, None]

@@ -293,7 +293,7 @@ class Weighing:
             log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
         amplitudes = _amplitudes(self._model, lattice, second_index, first_index) * noise_sd[:, None]
         for amplitude, indices in zip(lattice.member.amplitude_indices, (first_index, second_index), strict=False):
-            log_weight += log_prior_of_amplitude(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
+            log_weight += log_prior_of_log(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
             log_weight += _log_cells(indices, lattice.step)
         misfit, numbers = lattice.misfit[second_index, first_index, self._index], np.full(len(first_index), member)
         return Points(numbers, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
@@ -319,7 +319,7 @@ def _known_log_weights(model: StatisticalModel, lattice: Lattice, data_sets: sli
     log_weights = lattice.log_likelihoods(data_sets, noise_sd) + np.log(member.probability)
     for amplitude, grid, axes in zip(member.amplitude_indices, lattice.ratios, ((0, 2), (1, 2)), strict=False):
         prior = model.priors[model.energy_symbols[amplitude]]
-        of_grid = log_prior_of_amplitude(prior, grid * noise_sd) + _log_cells(np.arange(len(grid)), lattice.step)
+        of_grid = log_prior_of_log(prior, grid * noise_sd) + _log_cells(np.arange(len(grid)), lattice.step)
         log_weights += np.expand_dims(of_grid, axes)
     return np.asarray(log_weights)
 
@@ -365,14 +365,14 @@ def _log_cells(place_on_grid: IndexArray, step: float) -> FloatArray:
     return np.asarray(np.log(np.where(place_on_grid == 0, step / -np.expm1(-step), step)))
 
 
-def log_prior_of_amplitude(prior: Prior, amplitude: FloatArray) -> FloatArray:
-    """Return the log prior density (M,) of the logarithms of amplitudes (M,)."""
-    return np.asarray(prior.log_density(amplitude) + np.log(amplitude))
+def log_prior_of_log(prior: Prior, values: FloatArray) -> FloatArray:
+    """Return the log prior density (M,) of the logarithms of amplitudes or noise (M,)."""
+    return np.asarray(prior.log_density(values) + np.log(values))
 
 
 def log_prior_of_noise(model: StatisticalModel, ratios: Mapping[str, float], noise_sd: FloatArray) -> FloatArray:
     """Return the log prior density (M,) of log noise_sd, and of the noise's other parameters over it."""
-    value = model.priors["noise_sd"].log_density(noise_sd) + np.log(noise_sd)
+    value = log_prior_of_log(model.priors["noise_sd"], noise_sd)
     for symbol, ratio in ratios.items():
         value = value + model.priors[symbol].log_density(ratio * noise_sd) + np.log(noise_sd)
     return np.asarray(value)

@@ -17,6 +17,7 @@ from numpy.polynomial.polynomial import polyfit
 
 from tissuq.arrays import FloatArray
 from tissuq.errors import ConvergenceError
+from tissuq.inference.enumerators.amplitudes import log_prior_of_log
 from tissuq.inference.enumerators.line import OF_SUM, ROUGH, Accuracy
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, blended, marginal_of_table
@@ -104,7 +105,7 @@ class NoiseGrid:
             log_evidence = solutions[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
-            return log_evidence + float(prior.log_density(noise_sd)) + log_noise
+            return log_evidence + float(log_prior_of_log(prior, noise_sd))
 
         largest = float(np.abs(model.experiment.measured).max())
         ends = _ends(prior)
@@ -254,7 +255,7 @@ def _table(
 
     heights, lowest = log_weights - log_weights.max(), min(_ends(prior)[0], float(logs[0]))
     tail = np.linspace(lowest, logs[0], TAIL_POINTS if lowest < logs[0] else 0, endpoint=False)
-    of_tail = _beneath(logs, heights, prior)(np.exp(2 * (tail - logs[0]))) + _log_prior(prior, tail)
+    of_tail = _beneath(logs, heights, prior)(np.exp(2 * (tail - logs[0]))) + log_prior_of_log(prior, np.exp(tail))
     table = np.linspace(logs[0], logs[-1], TABLE_POINTS)
     interpolator = Akima1DInterpolator if is_local or len(logs) < MIN_SPLINE else CubicSpline
     return np.append(tail, table), np.exp(np.append(of_tail, interpolator(logs, heights)(table)))
@@ -265,7 +266,8 @@ def _beneath(logs: FloatArray, log_weights: FloatArray, prior: Prior) -> Polynom
 
     As it is where the noise is small beside other independent errors.
     """
-    squares, log_likelihoods = np.exp(2 * (logs[:3] - logs[0])), log_weights[:3] - _log_prior(prior, logs[:3])
+    squares = np.exp(2 * (logs[:3] - logs[0]))
+    log_likelihoods = log_weights[:3] - log_prior_of_log(prior, np.exp(logs[:3]))
     return Polynomial(polyfit(squares, log_likelihoods, len(squares) - 1))
 
 
@@ -273,11 +275,6 @@ def _is_flat_beneath(logs: FloatArray, log_weights: FloatArray, prior: Prior) ->
     """Return whether the log likelihood hardly changes from the least value of the noise down to none."""
     none, least = _beneath(logs, log_weights, prior)(np.array([0.0, 1.0]))
     return bool(abs(least - none) < MAX_CHANGE)
-
-
-def _log_prior(prior: Prior, log_noise: FloatArray) -> FloatArray:
-    """Return the log density of the logarithm of the noise under its prior."""
-    return np.asarray(prior.log_density(np.exp(log_noise)) + log_noise)
 
 
 def _shares(logs: FloatArray, table: FloatArray, density: FloatArray) -> FloatArray:
@@ -299,21 +296,21 @@ def shares_with_factors(logs: FloatArray, shares: FloatArray, log_factors: Float
     prior : Prior
         Of the noise, beyond whose bounds it cannot lie.
     """
-    log_density = np.log(shares)
+    log_density, ends = np.log(shares), _ends(prior)
     for _ in range(DENSITY_STEPS):
-        of_values = _masses(logs, log_density[:, None], prior)[:, 0]
+        of_values = _masses(logs, log_density[:, None], ends)[:, 0]
         log_density = log_density + DENSITY_STEP * np.log(shares / of_values * of_values.sum())
     blocks = np.array_split(log_density[:, None] + log_factors, 1 + log_factors.shape[1] // FACTORS_AT_ONCE, axis=1)
-    masses = np.concatenate([_masses(logs, heights, prior) for heights in blocks], axis=1)
+    masses = np.concatenate([_masses(logs, heights, ends) for heights in blocks], axis=1)
     return np.asarray(masses / masses.sum(axis=0))
 
 
-def _masses(logs: FloatArray, heights: FloatArray, prior: Prior) -> FloatArray:
+def _masses(logs: FloatArray, heights: FloatArray, ends: tuple[float, float]) -> FloatArray:
     """Return the mass (k, n) that belongs to every value, of densities with these logarithms (k, n) over their largest.
 
     Beyond the values the logarithm goes on for a few steps, as a parabola through the last three that does not open
     upwards; then, where the noise is too small to matter, it falls in proportion to the noise, which its prior leaves.
-    None lies beyond the prior's bounds.
+    None lies beyond the ends of the prior.
     """
     from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
@@ -330,8 +327,7 @@ def _masses(logs: FloatArray, heights: FloatArray, prior: Prior) -> FloatArray:
         distance = (table[is_beyond] - x[0])[:, None]
         log_density[is_beyond] = y[0] + distance * (slopes[0] + bend * (distance - (x[1] - x[0])))
     log_density[: len(tail)] = log_density[len(tail)] + (tail - table[len(tail)])[:, None]
-    low, high = _ends(prior)
-    cells = np.exp(log_density) * (np.gradient(table) * (low <= table) * (table <= high))[:, None]
+    cells = np.exp(log_density) * (np.gradient(table) * (ends[0] <= table) * (table <= ends[1]))[:, None]
     return np.asarray(np.array([np.interp(table, logs, unit) for unit in np.eye(len(logs))]) @ cells)
 
 
