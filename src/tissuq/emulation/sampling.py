@@ -17,8 +17,8 @@ from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
 from tissuq.inference.enumerators.ridges import around_peaks
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.proposals import fitted_mixture, weighted_points
-from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, effective, log_normal, sobol_rounds, systematic
+from tissuq.inference.proposals import WeightedPoints, fitted_mixture, weighted_points
+from tissuq.inference.quasi_monte_carlo import LOG_OF_NOTHING, log_normal, sobol_rounds, systematic
 from tissuq.parameters.priors import Prior
 
 ROUND_POINTS, ROUNDS, MAX_ROUNDS = 1024, 16, 64
@@ -105,18 +105,14 @@ def sample_posterior(likelihood: Likelihood, seed: int = 0, method: Method = "au
 def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
     """Return weighted points: scores of a standard normal prior, drawn from heavy-tailed fits of the posterior."""
     problem = likelihood.problem
-    scores, logs = _weighted_scores(likelihood, seed)
-    weights = np.exp(logs - logs.max())
-    mean_weight = float(weights.mean())
-    weights /= weights.sum()
-    count, effective_points, heaviest = len(logs), effective(logs), float(weights.max())
-    converged = _suffice(logs)
+    weighted = _weighted_scores(likelihood, seed)
+    weights, effective, converged = weighted.weights, weighted.effective, _suffice(weighted)
     verdict = (
-        f"{'Converged' if converged else 'Not converged'}: {effective_points:.0f} of {count} weighted points are "
-        f"effective (at least {MIN_EFFECTIVE_POINTS}); the heaviest has {heaviest:.2g} of the weight (less than "
+        f"{'Converged' if converged else 'Not converged'}: {effective:.0f} of {len(weights)} weighted points are "
+        f"effective (at least {MIN_EFFECTIVE_POINTS}); the heaviest has {weights.max():.2g} of the weight (less than "
         f"{MAX_POINT_WEIGHT})."
     )
-    values = problem.values_of(scores)
+    values = problem.values_of(weighted.points)
     order = np.random.default_rng([seed, 47]).permutation(systematic(weights[None], CHAINS * DRAWS)[0])
     return SampledPosterior(
         priors=problem.priors,
@@ -125,16 +121,16 @@ def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
         method="importance",
         converged=converged,
         verdict=verdict,
-        ess=dict.fromkeys(problem.symbols, effective_points),
+        ess=dict.fromkeys(problem.symbols, effective),
         rhat={},
-        log_evidence=float(logs.max() + np.log(mean_weight)),
-        log_evidence_error=float(np.sqrt(max(1 / effective_points - 1 / count, 0.0))),
+        log_evidence=weighted.log_mass,
+        log_evidence_error=weighted.relative_error,
         draws=values[order].reshape(CHAINS, DRAWS, -1),
     )
 
 
-def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return scores (N, D) and the logarithms of their weights (N,), over the mixture of all rounds' proposals.
+def _weighted_scores(likelihood: Likelihood, seed: int) -> WeightedPoints:
+    """Return weighted scores (N, D).
 
     The first rounds lie around peaks and along ridges. Where the emulator is uncertain every outcome is possible, and a
     search for these may end there. So there are two, one of them as if the emulator were exact.
@@ -147,15 +143,14 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
     for number, weighted in enumerate(rounds, 1):
         if not weighted.log_weights.max() > LOG_OF_NOTHING:
             raise ConvergenceError("the measurements have no probability at any parameters that the priors allow.")
-        if number >= ROUNDS and _suffice(weighted.log_weights):
+        if number >= ROUNDS and _suffice(weighted):
             break
-    return weighted.points, weighted.log_weights
+    return weighted
 
 
-def _suffice(logs: FloatArray) -> bool:
-    """Return whether points with these log weights (N,) represent a posterior."""
-    heaviest = np.exp(logs.max() - np.logaddexp.reduce(logs))
-    return bool(effective(logs) > MIN_EFFECTIVE_POINTS and heaviest < MAX_POINT_WEIGHT)
+def _suffice(weighted: WeightedPoints) -> bool:
+    """Return whether weighted points represent a posterior."""
+    return bool(weighted.effective > MIN_EFFECTIVE_POINTS and weighted.weights.max() < MAX_POINT_WEIGHT)
 
 
 def _log_target(likelihood: Likelihood, scores: FloatArray) -> FloatArray:

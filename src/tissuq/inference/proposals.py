@@ -81,6 +81,22 @@ class WeightedPoints(NamedTuple):
         """The logarithm of the integral of the density."""
         return float(np.logaddexp.reduce(self.log_weights)) - log(len(self.points))
 
+    @property
+    def weights(self) -> FloatArray:
+        """The weights (N,), which sum to one."""
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        return np.asarray(weights / weights.sum())
+
+    @property
+    def effective(self) -> float:
+        """The effective number of points."""
+        return effective(self.log_weights)
+
+    @property
+    def relative_error(self) -> float:
+        """The standard error of the mass, over it."""
+        return float(np.sqrt(max(1 / self.effective - 1 / len(self.points), 0.0)))
+
 
 def weighted_points(
     log_density: Callable[[FloatArray], FloatArray],
@@ -114,11 +130,14 @@ def weighted_points(
         blocks = [(proposal, block) for (_, proposal), block in parts if len(block)]
         new = np.concatenate([proposal.points(block) for proposal, block in blocks])
         more = [(len(block) / count, proposal) for proposal, block in blocks]
+        log_proposed = _log_mixture(more, new)
+        mixture = np.concatenate([
+            np.logaddexp(mixture, _log_mixture(more, points)), np.logaddexp(_log_mixture(proposals, new), log_proposed)
+        ])  # fmt: skip
         proposals += more
-        mixture = np.concatenate([np.logaddexp(mixture, _log_mixture(more, points)), _log_mixture(proposals, new)])
         points, heights = np.concatenate([points, new]), np.concatenate([heights, log_density(new)])
         log_weights = _log_ratio(heights, mixture - np.log(number + 1))
-        yield WeightedPoints(points, log_weights, _log_ratio(heights[-count:], _log_mixture(more, new)))
+        yield WeightedPoints(points, log_weights, _log_ratio(heights[-count:], log_proposed))
 
 
 def fitted_proposal(points: FloatArray, log_weights: FloatArray) -> Mixture:
@@ -206,7 +225,7 @@ def adapted(
     proposal, log_mass = start or Proposal(np.zeros(dimension), np.eye(dimension)), None
     for _ in range(MAX_SEARCHES):
         for weighted in weighted_points(log_density, [[(1.0, proposal)]], rounds, fitted_proposal):
-            number, of_round = effective(weighted.log_weights), effective(weighted.log_weights_of_round)
+            number, of_round = weighted.effective, effective(weighted.log_weights_of_round)
             if min_effective is None:
                 is_found = number >= _least_effective(dimension) and of_round > MIN_EFFECTIVE_SHARE * count
             else:

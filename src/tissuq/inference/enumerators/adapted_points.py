@@ -16,7 +16,7 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.proposals import Mixture, fitted_mixture, weighted_points
-from tissuq.inference.quasi_monte_carlo import effective, log_normal, sobol_rounds
+from tissuq.inference.quasi_monte_carlo import log_normal, sobol_rounds
 from tissuq.inference.solution import Marginals, Representation, Solution
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.scales import at_scores
@@ -79,7 +79,7 @@ class AdaptedPoints:
         count = 1 << int(share * POINTS_PER_PARAMETER * dimension).bit_length()
         uniforms = islice(sobol_rounds(dimension, count, seed=0), MAX_ROUNDS)
         for done, weighted in enumerate(weighted_points(density, starts, uniforms, fitted_mixture), 1):
-            number = effective(weighted.log_weights)
+            number = weighted.effective
             log_masses.append(weighted.log_mass)
             needed = 2 if self.start else MIN_ROUNDS
             if done >= needed and number >= min_effective and np.ptp(log_masses[-MIN_ROUNDS:]) < MAX_CHANGE:
@@ -89,12 +89,10 @@ class AdaptedPoints:
                 f"the posterior of {', '.join(model.nonlinear)} was not found well enough: {number:.0f} of "
                 f"{len(weighted.points)} points are effective. Give narrower priors, or use the method 'nuts'."
             )
-        points, log_weights, _ = weighted
-        self.start = fitted_mixture(points, log_weights)
-        weights = np.exp(log_weights - log_weights.max())
-        weights /= weights.sum()
-        matters = weights > NEGLIGIBLE_WEIGHT
-        weights, settings = weights[matters] / weights[matters].sum(), density.settings(points[matters])
+        self.start = fitted_mixture(weighted.points, weighted.log_weights)
+        matters = weighted.weights > NEGLIGIBLE_WEIGHT
+        weights, settings = weighted.weights[matters], density.settings(weighted.points[matters])
+        weights = weights / weights.sum()
         gaussians = density.conditional(settings[None])
         mixture = GaussianMixture(weights, settings, gaussians.mean[0], gaussians.root[0])
         truncated = TruncatedMixture(mixture, density.conditional.boxes)
@@ -114,7 +112,7 @@ class AdaptedPoints:
         if model.is_improper:
             return solution
         _, error_of_mass = truncated.checked_masses(model.linear)
-        error = float(np.sqrt(1 / number - 1 / len(log_weights))) + error_of_mass
+        error = weighted.relative_error + error_of_mass
         return replace(solution, log_evidence=weighted.log_mass, log_evidence_error=error)
 
 
