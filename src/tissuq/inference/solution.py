@@ -170,6 +170,14 @@ class Solution:
         """Whether `wide_mixture` is another one than `mixture`."""
         return self.representation.compute_wide is not None
 
+    def thinned(self, count: int) -> GaussianMixture:
+        """Return few components of `mixture` that stand for all, as `GaussianMixture.thinned` does.
+
+        Draws of a sampler, which are in no order, are taken along the axis on which they differ most.
+        """
+        is_unordered = self.sampled is not None and self.mixture.member is None
+        return (self.mixture.along_main_axis() if is_unordered else self.mixture).thinned(count)
+
     def few_components(self, count: int | None, *, is_wide: bool = False) -> GaussianMixture:
         """Return at most so many components that stand for `mixture`, or for `wide_mixture`; neither is kept."""
         with one_thread():

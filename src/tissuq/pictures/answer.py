@@ -90,7 +90,7 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     curves = solution.model.experiment.curves
     curve, count = curves[0], f", 1 of {len(curves)}" if len(curves) > 1 else ""
     across = points_along(curve, SMALL_POINTS)
-    rough = replace(solution, representation=Representation.of(solution.mixture.thinned(FEW)))
+    rough = replace(solution, representation=Representation.of(solution.thinned(FEW)))
     of_curve = predict_band(rough, across, curve=curve)
     low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
     measured = curve.stress / unit.to_mpa

@@ -15,7 +15,6 @@ from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.curve import Curve
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
@@ -272,7 +271,7 @@ def predictive_mixtures(
     """
     count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
     mixture = [
-        (solution.model, (thinned := _in_order(solution).thinned(count).merged()).weighted(weight * thinned.weights))
+        (solution.model, (thinned := solution.thinned(count).merged()).weighted(weight * thinned.weights))
         for weight, solution in weighted_solutions
     ]
     for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
@@ -282,12 +281,6 @@ def predictive_mixtures(
         ]
         weights, mean, *variances = (np.concatenate(arrays) for arrays in zip(*moments, strict=True))
         yield [Mixtures(weights, mean, variance) for variance in variances]
-
-
-def _in_order(solution: Solution) -> GaussianMixture:
-    """Return the components of a posterior, neighbours beside each other; draws of a sampler are in no order."""
-    mixture = solution.mixture
-    return mixture if solution.sampled is None or mixture.member is not None else mixture.along_main_axis()
 
 
 def asked_for(

@@ -192,7 +192,7 @@ def mean_curve_and_slopes(
 ) -> tuple[FloatArray, FloatArray | None]:
     """Return `mean_curve` (n,), and its slopes (n, c) along the controls of every test, MPa."""
     model = solution.model
-    components = solution.mixture if thinned is None else solution.mixture.thinned(thinned)
+    components = solution.mixture if thinned is None else solution.thinned(thinned)
     mean, _ = stress_moments(model, components, model.states)
     curve = model.at_measurements(components.weights @ mean)
     if not with_slopes:
