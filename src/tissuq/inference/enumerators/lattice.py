@@ -1,7 +1,8 @@
 """One energy discrepancy on one design: the linear parameters given the ratios of its amplitudes to the noise.
 
-What costs most, a decomposition for each ratio of the second block, depends on the stretches alone: it serves all data
-sets and all exponents of the material. The ratio of the first block and the noise enter by sums over few directions.
+What costs most, a decomposition of the block with fewer terms for each ratio of the other, depends on the stretches
+alone: it serves all data sets and all exponents of the material. The ratio of the decomposed block and the noise enter
+by sums over few directions.
 """
 
 from __future__ import annotations
@@ -149,9 +150,10 @@ class Directions:
     ratios : tuple of (G1,) and (G2,) arrays
         Of the first and the second block; a block that is missing has the one ratio zero.
     step : float
-    variance : (G2, G1, d) array
-        Of the stresses along the directions, in units of the noise.
-    log_size : (G2, G1) array
+    variance : (Gw, Gd, d) array
+        Of the stresses along the directions, in units of the noise: for every ratio of the block that is made white and
+        of the one that is decomposed given that.
+    log_size : (Gw, Gd) array
         Half the log determinant of the covariance in units of the noise.
     """
 
@@ -174,22 +176,28 @@ class Directions:
         grids = [*(_grid(size, low, step, shift, largest) for size, low in pairs), *[np.zeros(1)] * 2]
         self.ratios = grids[0], grids[1]
         self.basis, triangle = np.linalg.qr(side_by_side(features, len(scale)))
-        first_block, second_block = np.split(triangle, [features[0].shape[1] if features else 0], axis=1)
-        # White in the second block, for all of its ratios, and then in the first.
-        values, vectors = np.linalg.eigh(second_block @ second_block.T)
-        variance = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
-        self._vectors, self._second_sd = vectors, np.sqrt(variance)
-        white_block = (vectors.T @ first_block) / self._second_sd[:, :, None]
+        blocks = np.split(triangle, [features[0].shape[1] if features else 0], axis=1)
+        self._decomposed = int(len(features) > 1 and blocks[1].shape[1] < blocks[0].shape[1])
+        whitened = 1 - self._decomposed
+        # White in one block, for all of its ratios, and then in the one with fewer terms.
+        values, vectors = np.linalg.eigh(blocks[whitened] @ blocks[whitened].T)
+        variance = 1 + self.ratios[whitened][:, None] ** 2 * np.maximum(values, 0.0)
+        self._vectors, self._whitened_sd = vectors, np.sqrt(variance)
+        white_block = (vectors.T @ blocks[self._decomposed]) / self._whitened_sd[:, :, None]
         self._left_vectors, singular, _ = np.linalg.svd(white_block, full_matrices=False)
-        self.variance = 1 + (self.ratios[0][:, None] * singular[:, None]) ** 2
+        self.variance = 1 + (self.ratios[self._decomposed][:, None] * singular[:, None]) ** 2
         self.log_size = 0.5 * (np.log(variance).sum(axis=1)[:, None] + _log_product(self.variance))
+
+    def by_second_and_first(self, values: FloatArray) -> FloatArray:
+        """Return values (Gw, Gd, ...) by the ratios of the second block and of the first, (G2, G1, ...)."""
+        return values.swapaxes(0, 1) if self._decomposed == 1 else values
 
     def along(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return columns (r, k), given in the features' basis, along the directions, and the rest.
 
-        Along the directions (G2, d, k), for unit noise; the rest (G2, r, k) is orthogonal to them, of unit variance.
+        Along the directions (Gw, d, k), for unit noise; the rest (Gw, r, k) is orthogonal to them, of unit variance.
         """
-        white = (self._vectors.T @ columns) / self._second_sd[:, :, None]
+        white = (self._vectors.T @ columns) / self._whitened_sd[:, :, None]
         along = self._left_vectors.swapaxes(1, 2) @ white
         return along, white - self._left_vectors @ along
 
@@ -243,9 +251,10 @@ class Lattice:
         precision, pull = np.split(of_design, [p], axis=4)
         tiny = 1e-15 * np.trace(precision, axis1=3, axis2=4)[..., None, None] * np.eye(p)
         gaussian = integrated(precision + tiny, pull, size)
-        self._root, self._scores = gaussian.root, gaussian.scores
-        self.misfit = np.maximum(gaussian.misfit, 0.0).reshape(*size.shape[:2], designs * k)
-        self.log_size = directions.log_size[:, :, None] - gaussian.log_volume + fit.log_size
+        misfit = np.maximum(gaussian.misfit, 0.0).reshape(*size.shape[:2], designs * k)
+        log_size = directions.log_size[:, :, None] - gaussian.log_volume + fit.log_size
+        of_ratios = misfit, log_size, gaussian.root, gaussian.scores
+        self.misfit, self.log_size, self._root, self._scores = map(directions.by_second_and_first, of_ratios)
 
     def log_likelihood(
         self, data_set: int, second_index: IndexArray, first_index: IndexArray, noise_sd: FloatArray
