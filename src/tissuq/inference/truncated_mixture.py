@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tissuq.arrays import BoolArray, FloatArray
+from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -35,6 +35,10 @@ POINTS_PER_COMPONENT = 1000
 """Points for each of so many components, that stand for all together where more bounds cut than can be integrated."""
 SAME_GAUSSIAN = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
+VALUES_AT_ONCE = 50_000
+"""Values of single Gaussians that are computed together: few enough for a processor's cache."""
+MAX_SPREAD = 5000
+"""Components, at most, over which the points are spread at which the density of a cut mixture is computed."""
 MAX_VALUES = 300_000
 """Values of single Gaussians, at most, from which the density of a cut mixture is computed."""
 HEAVY_SHARE = 1e-6
@@ -211,28 +215,35 @@ def _marginal_of_cut(gaussians: GaussianMixture, index: int, cut_index: int, end
     cut_variance = np.maximum(sd**2 - along**2 * (1 - shrink), 0.0)
     mean = float(weights @ cut_mean)
     variance = float(weights @ (cut_variance + (cut_mean - mean) ** 2))
-    scores = np.linspace(-25, 25, 51)  # what a bound leaves may have an exponential tail
-    spread = cut_mean[:, None] + np.sqrt(cut_variance)[:, None] * scores
+    scores, cut_sd = np.linspace(-25, 25, 51), np.sqrt(cut_variance)  # a bound may leave an exponential tail
     limits = ends if index == cut_index else (-np.inf, np.inf)
-    reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
-    shares = weights[:, None] * np.exp(-np.abs(scores))
+    reach = (
+        max((cut_mean + scores[0] * cut_sd).min(), limits[0]),
+        min((cut_mean + scores[-1] * cut_sd).max(), limits[1]),
+    )
+    sample = slice(None, None, 1 + len(weights) // MAX_SPREAD)
+    spread = np.clip(cut_mean[sample, None] + cut_sd[sample, None] * scores, *reach)
+    shares = weights[sample, None] * np.exp(-np.abs(scores))
     count = max(2 * MIXTURE_NODES, min(4 * MIXTURE_NODES, MAX_VALUES // len(weights)))
-    coarse = weighted_grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, count)
-    scores = (coarse - means[:, index, None]) / sd[:, None]
-    log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
-    rise = -scores
-    if index != cut_index:
-        correlation = np.clip(along / sd, -1 + 1e-12, 1 - 1e-12)[:, None]
-        complement = np.sqrt(1 - correlation**2)
-        low_given, high_given = ((end[:, None] - correlation * scores) / complement for end in (low, high))
-        log_given = log_interval(low_given, high_given)
-        log_density += log_given
-        with np.errstate(over="ignore"):  # far from a component, where it has no height
-            rise += correlation / complement * (_height(low_given, log_given) - _height(high_given, log_given))
-    heights = weights[:, None] * np.exp(log_density)
-    slopes = np.where(heights > 0, rise, 0.0) * heights / sd[:, None]
-    smooth = HermiteCubics(coarse, heights.sum(axis=0), slopes.sum(axis=0))
-    points = refined(coarse)
+    coarse = weighted_grid(spread.ravel(), shares.ravel(), reach, count)
+
+    def density_and_slope(block: IndexArray) -> tuple[FloatArray, FloatArray]:
+        scores = (coarse - means[block, index, None]) / sd[block, None]
+        log_density = -0.5 * scores**2 - (np.log(sd[block] * np.sqrt(2 * np.pi)) + log_mass[block])[:, None]
+        rise = -scores
+        if index != cut_index:
+            correlation = np.clip(along[block] / sd[block], -1 + 1e-12, 1 - 1e-12)[:, None]
+            complement = np.sqrt(1 - correlation**2)
+            low_given, high_given = ((end[block, None] - correlation * scores) / complement for end in (low, high))
+            log_given = log_interval(low_given, high_given)
+            log_density += log_given
+            with np.errstate(over="ignore"):  # far from a component, where it has no height
+                rise += correlation / complement * (_height(low_given, log_given) - _height(high_given, log_given))
+        heights = weights[block, None] * np.exp(log_density)
+        return heights.sum(axis=0), (np.where(heights > 0, rise, 0.0) * heights / sd[block, None]).sum(axis=0)
+
+    blocks = np.array_split(np.arange(len(weights)), 1 + len(weights) * len(coarse) // VALUES_AT_ONCE)
+    smooth, points = HermiteCubics(coarse, *np.sum(list(map(density_and_slope, blocks)), axis=0)), refined(coarse)
     return Marginal.of(mean, float(np.sqrt(variance)), points, smooth(points), smooth.integral(points))
 
 

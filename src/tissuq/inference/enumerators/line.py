@@ -47,6 +47,8 @@ class Accuracy(NamedTuple):
         taken.
     bounded_points : int
         Points, at most, of which masses are computed within bounds of more parameters than two.
+    points_of_value : int
+        Points of an energy's amplitudes, at most, that are kept of each value of the other parameters.
     tolerance : float
         Of the interpolation of adaptive quadrature, relative to its integral.
     """
@@ -58,14 +60,15 @@ class Accuracy(NamedTuple):
     min_effective: float
     enough_effective: float
     bounded_points: int
+    points_of_value: int
     tolerance: float
 
 
 PROBABILITIES = (0.001, 0.012, 0.06, 0.16, 0.32, 0.5, 0.68, 0.84, 0.94, 0.988, 0.999)
-FINE = Accuracy(2.0, 0.22, 6.5, PROBABILITIES, 20.0, 200.0, 8000, 1e-3)
-OF_SUM = FINE._replace(enough_effective=20.0)
+FINE = Accuracy(2.0, 0.22, 6.5, PROBABILITIES, 20.0, 200.0, 8000, 2000, 1e-3)
+OF_SUM = FINE._replace(enough_effective=20.0, bounded_points=4000, points_of_value=1000)
 """For one of many posteriors that are summed, each with points of its own."""
-ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0, 6.0, 500, 0.03)
+ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0, 6.0, 500, 500, 0.03)
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ UNLIKELY_PROBABILITY = 1e-3
 OUTER_STEP, BEGINNINGS = 2 * LOG_RATIO_STEP, 2
 """Step of the lattices at values of the outer parameters, and how many places they begin at in turn: so their errors
 are of either sign and cancel."""
-MAX_POINTS_OF_NODE, MAX_POINTS = 2000, 60_000
-"""Points kept of each value, and where there are no outer parameters."""
+MAX_POINTS = 60_000
+"""Points kept where there are no outer parameters."""
 SETTINGS_AT_ONCE = 32
 """Values of which the lattices are computed together, which bounds the memory."""
 MAX_RATIO_TO_DATA = 3000.0
@@ -109,10 +109,10 @@ def _largest_ratios(models: Sequence[StatisticalModel]) -> list[float]:
 
 
 class Sums:
-    """The posterior of one model at any value of its outer parameters."""
+    """The posterior of one model at any value of its outer parameters, of which nodes keep so many points at most."""
 
-    def __init__(self, model: StatisticalModel, outer: Outer) -> None:
-        self.model, self._outer, self._calls = model, outer, 0
+    def __init__(self, model: StatisticalModel, outer: Outer, points_of_value: int) -> None:
+        self.model, self._outer, self._points_of_value, self._calls = model, outer, points_of_value, 0
         self._terms = _Terms([model])
         self._known: dict[tuple[int, int], Directions] = {}
 
@@ -126,7 +126,7 @@ class Sums:
         for lattices, index, weighing in self._weighings(settings, members):
             of_setting, call = settings[len(nodes)], first_call + len(nodes)
             points, error = weighing.points()
-            points = _thinned(points, MAX_POINTS_OF_NODE, GOLDEN_RATIO * call % 1)
+            points = _thinned(points, self._points_of_value, GOLDEN_RATIO * call % 1)
             mean, root = linear_at(lattices, index, points)
             points = replace(points, lattice=members[points.lattice])
             nodes.append(Node(points, mean, root, error, of_setting, self._outer.ratios(of_setting)))

@@ -38,7 +38,8 @@ def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], F
         When the posterior of these parameters is far outside their priors, or few of the values hold nearly all of it.
     """
     outer = Outer(model)
-    search = _Search(Sums(model, outer), outer, len(model.energy_members))
+    sums = Sums(model, outer, guide.accuracy.points_of_value)
+    search = _Search(sums, outer, len(model.energy_members))
     return search.on_line(guide) if len(outer.symbols) == 1 else search.by_proposal(guide)
 
 
