@@ -344,6 +344,9 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(done, here):
     assert needed["new specimen"]["specimens"] == ""
     assert "Specimens like these for ± 8 %" in text
     assert "not reached: specimens differ more" in text
+    page = " ".join((here / "run" / "report.html").read_text(encoding="utf-8").split())
+    assert "with a mean that is linear in age (per year). The prior of every spread" in page
+    assert "the file of each was read stands under" in page
     patient = next(row for row in rows_of(here / "run" / "population.csv") if row["quantity"] == "new specimen")
     assert float(patient["median"]) == pytest.approx(
         np.exp(np.polyval(np.polyfit(AGES, np.log(MODULI_KPA), 1), 80)), 0.1

@@ -16,6 +16,7 @@ import tissuq as tq
 from tissuq.assessment.uses import COMPUTING, Use, Verdict
 from tissuq.population import answer
 from tissuq.population.answer import use_of_law_alone
+from tissuq.population.covariates import covariates_of
 from tissuq.population.next_step import STEPS_OF_POPULATIONS, next_step
 from tissuq.population.uses import CONTRADICTING, DEPARTING, NOT_PREDICTED, PREDICTING
 from tissuq.population.warnings import _far_specimens, far_specimens
@@ -483,6 +484,7 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     }
     population = SimpleNamespace(
         posteriors=fits, converged=True, symbols=("C10",), coordinates=SimpleNamespace(is_log=[True]),
+        covariates=covariates_of(None, tuple(fits)),
         summary=lambda: {"median": {("C10", "spread"): 0.3}},
         complete=SimpleNamespace(model=SimpleNamespace(discrepancy=SimpleNamespace(is_best_fit=False, parameters=()))),
     )  # fmt: skip
@@ -506,7 +508,11 @@ def test_a_specimen_far_from_the_others_is_a_problem_to_look_at_next():
     assert said_next((), share=0.3).startswith("fit another law (--material) before you compute")
     useless = [Use(PREDICTING, Verdict.NO, "known to no better than ± 100 %")]
     assert "--aim 20%" in said_next(useless)
-    assert said_next(useless, has_aim=True).startswith("find out what sets the specimens apart")
+    assert said_next(useless, has_aim=True).startswith("find out what sets the specimens apart (--covariates); how")
+    specimens = [f"s{number}" for number in range(8)]
+    population.covariates = covariates_of({name: {"age": float(name[1])} for name in specimens}, specimens)
+    assert "find out what sets the specimens apart (--covariates beside age); how" in said_next(useless, has_aim=True)
+    assert "sets them apart (covariates beside age)" in next_step(population, useless, 0.0).python
     assert said_next(useless, has_aim=True, share=0.3).startswith("fit another law")
     not_predicted = [Use(PREDICTING, Verdict.NO, NOT_PREDICTED)]
     assert "finite elements" in said_next(not_predicted)

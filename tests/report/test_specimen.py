@@ -69,6 +69,8 @@ def test_the_text_for_a_paper_has_model_data_errors_priors_and_result(result, sp
     posterior, modulus = specimen_study.posteriors["auto"], result.numbers[0]
     assert f"W = C10 (I1 - 3) (Treloar 1943), was fitted by Bayesian inference with tissuq {tq.__version__}" in text
     assert f"{len(specimen_study.experiment)} measurements" in text
+    assert specimen_study.experiment.source
+    assert f"{specimen_study.experiment.source}. The measured stress was taken as" in text
     assert "a further free energy of the invariants without initial stiffness" in text
     assert posterior.model.meaning in text
     assert "Errors of whole tests" not in text

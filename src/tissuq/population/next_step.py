@@ -29,10 +29,10 @@ STEPS_OF_POPULATIONS: Mapping[str, Step] = {
         "see what the fits do not follow: tq.fit of one specimen says what to do about it",
     ),
     "spread": Step(
-        "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates) before you "
+        "find out why the specimens differ so much (units, areas, kinds of tissue: --covariates{beside}) before you "
         "compute with a new one",
-        "find out why the specimens differ so much (units, areas, kinds of tissue: covariates) before you compute with "
-        "a new one",
+        "find out why the specimens differ so much (units, areas, kinds of tissue: covariates{beside}) before you "
+        "compute with a new one",
     ),
     "law": Step(
         "fit another law (--material) before you compute with a new specimen, whose cards leave the discrepancy "
@@ -41,21 +41,23 @@ STEPS_OF_POPULATIONS: Mapping[str, Step] = {
         "one specimen says which",
     ),
     "number": Step(
-        "find out what sets the specimens apart (--covariates); how many it takes stands beneath the parameters",
-        "find out what sets the specimens apart (covariates); population.specimens_needed says how many it takes",
+        "find out what sets the specimens apart (--covariates{beside}); how many it takes stands beneath the "
+        "parameters",
+        "find out what sets the specimens apart (covariates{beside}); population.specimens_needed says how many it "
+        "takes",
     ),
     "aim": Step(
         "see whether more specimens would make a new one predictable (the same command with --aim 20%), or what "
-        "sets them apart (--covariates)",
+        "sets them apart (--covariates{beside})",
         "see whether more specimens would make a new one predictable (population.specimens_needed(0.2)), or what sets "
-        "them apart (covariates)",
+        "them apart (covariates{beside})",
     ),
     "export": Step(
         "take a new specimen into finite elements: tissuq export {run} (structure and ensemble take the run, too)",
         "take a new specimen into finite elements: population.patient.ensemble(20), tq.write_cards",
     ),
 }
-"""What may be done next, beside looking at single specimens."""
+"""What may be done next, beside looking at single specimens; ``{beside}`` stands for covariates that are known."""
 
 
 def next_step(
@@ -86,7 +88,11 @@ def next_step(
         options = " ".join(f"--without {name}" for name in (*already_without, *names))
         return Step(f"{first} fit again, or leave {it} out: {options}", f"{first} fit again, or leave {it} out")
 
-    steps = STEPS_OF_POPULATIONS
+    known = ", ".join(covariate.name for covariate in population.covariates.each)
+    beside = f" beside {known}" * bool(known)
+    steps = {
+        name: Step(*(text.replace("{beside}", beside) for text in step)) for name, step in STEPS_OF_POPULATIONS.items()
+    }
     if not has_converged(population):
         return steps["converge"]
     if specimens_with(population, "doubtful-reading"):

@@ -29,6 +29,7 @@ PRIORS = (
     "sd, so none is given."
 )
 METHODS = "Text for the methods section of a paper"
+SPECIMENS = "The data and the model of every specimen"
 LAW = "The material model {0.name}, with the strain-energy density W = {0.formula} ({0.source}), was fitted"
 INTRODUCTION = "{law} by Bayesian inference with tissuq {version} to {data}."
 INTERVALS = "Posterior means, with 95 % highest-density intervals of {meaning}: {numbers}."
@@ -93,7 +94,7 @@ def specimens_section(
     sources = tuple(f"**{name}**: {test.source}." for name, of_one in tests.items() for test in of_one)
     discrepancy = discrepancy_in_words(model, model.discrepancy.name)
     law = f"{LAW.format(model.material)} to every specimen. {discrepancy} {noise_of_specimens(fits, unit)}"
-    return Section("The data and the model of every specimen", (sources, law))
+    return Section(SPECIMENS, (sources, law))
 
 
 def noise_of_specimens(fits: Mapping[str, Posterior], unit: StressUnit) -> str:
@@ -186,6 +187,7 @@ def methods_section(study: SpecimenStudy) -> Section:
         numbers.append(f"{name} {interval(mean, mean, sd)[0]} ({' to '.join(interval(low, high, sd))}) {unit.name}")
     sentences = (
         introduction,
+        f"{study.experiment.source}." if study.experiment.source else "",
         discrepancy_in_words(posterior.model, study.main),
         f"Noise: {noise_in_words(study, posterior)}.",
         WHOLE_TESTS.format(sizes=sizes) if sizes else "",

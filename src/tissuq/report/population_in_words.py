@@ -13,6 +13,7 @@ from tissuq.report.measured import (
     INTRODUCTION,
     LAW,
     METHODS,
+    SPECIMENS,
     WHOLE_TESTS,
     discrepancy_in_words,
     errors_in_words,
@@ -39,10 +40,14 @@ def between_specimens(study: PopulationStudy) -> str:
     gaussian = [f"The logarithm{'s' * (len(logs) > 1)} of {', '.join(logs)}"] * bool(logs)
     gaussian += [f"{', '.join(linear)} {'itself' if len(linear) == 1 else 'themselves'}"] * bool(linear)
     sizes = " (in units of the typical size, for parameters of either sign)" if linear else ""
+    verb, mean, of_effects = "is" if len(population.symbols) == 1 else "are", "", ""
+    if population.covariates:
+        effects = ", ".join(f"{name} ({per})" for name, per in population.covariates.effects)
+        mean = f", with a mean that is linear in {effects}"
+        of_effects = "; of effects, normal with sd 1 (of a number for its standard deviation among the specimens)"
     return (
-        f"{' and '.join(gaussian)} {'is' if len(population.symbols) == 1 else 'are'} Gaussian between specimens. The "
-        f"prior of every spread is half-normal with sd {study.settings.spread:.3g}{sizes}; of the mean, wide; of "
-        f"correlations, LKJ(2){'; of effects, normal with sd 1' * bool(population.covariates)}."
+        f"{' and '.join(gaussian)} {verb} Gaussian between specimens{mean}. The prior of every spread is half-normal "
+        f"with sd {study.settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2){of_effects}."
     )
 
 
@@ -60,6 +65,7 @@ def methods_of_population(study: PopulationStudy, answer: PopulationAnswer) -> S
             version=version("tissuq"),
             data=f"{len(population.posteriors)} specimens ({modes} tests, {study.measurements} measurements)",
         ),
+        f"How the file of each was read stands under '{SPECIMENS}'.",
         discrepancy_in_words(model, study.settings.discrepancy),
         noise_of_specimens(population.posteriors, unit),
         WHOLE_TESTS.format(sizes=sizes) if sizes else "",
