@@ -63,19 +63,23 @@ def test_the_next_step_fits_what_was_fitted(study, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "mode", "said"),
     [
-        ({"noise_sd": [0.01, 0.04]}, " --noise-sd 10,0.04,20"),  # of the new test the geometric mean
-        ({"noise_sd": 0.02}, " --noise-sd 20,0.02,20"),
-        ({"noise": "proportional"}, " --noise proportional"),
-        ({}, ""),
+        ({"noise_sd": [0.01, 0.04]}, "equibiaxial", " --noise-sd 10,0.04,20"),  # geometric mean of all for a new mode,
+        ({"noise_sd": [0.01, 0.04]}, "planar", " --noise-sd 10,0.04,40"),  # and of those in one that was measured
+        ({"noise_sd": 0.02}, "planar", " --noise-sd 20,0.02,20"),
+        ({"noise": "proportional"}, "planar", " --noise proportional"),
+        ({}, "planar", ""),
     ],
 )
-def test_the_next_step_has_the_noise_of_the_fit(options, said):
-    tests = [tq.simulate("neo-hookean", {"C10": 0.5}, [0.7, 0.9, 1.1, 1.3, 1.6], 0.02, seed=seed) for seed in (1, 2)]
-    tests = [test.labelled(stress_unit=unit) for test, unit in zip(tests, ("kPa", "MPa"), strict=True)]
-    model = tq.fit(tests, discrepancy="none", tolerances="as-tested", **options).model
-    assert _noise_option(model) == said
+def test_the_next_step_has_the_noise_of_the_fit(options, mode, said):
+    stretch = [0.7, 0.9, 1.1, 1.3, 1.6]
+    measured = [
+        tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.02, seed=1, mode=name).labelled(stress_unit=unit)
+        for name, unit in (("uniaxial", "kPa"), ("planar", "MPa"))
+    ]
+    model = tq.fit(measured, discrepancy="none", tolerances="as-tested", **options).model
+    assert _noise_option(model, mode) == said
 
 
 def test_the_next_step_has_priors_in_the_unit_of_the_data_and_what_must_be_stable(tmp_path):

@@ -79,19 +79,20 @@ def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
     fitted = f" --material {model.material.name}" * (model.material.name != default["material"])
     fitted += f" --discrepancy {model.discrepancy.name}" * ((model.discrepancy.name,) != default["discrepancies"])
     required = "".join(f" --stable-in {mode}" for mode in study.posterior.solution.stable_in)
-    options = fitted + modes + _noise_option(model) + errors + _prior_options(model) + required
+    options = fitted + modes + _noise_option(model, best["mode"]) + errors + _prior_options(model) + required
     test = NEXT.format(whose=whose, again=OR_AGAIN * bool(is_as_much), options=options)
     return f"{AFTER_WARNING} {test}" if is_spoilt else test
 
 
-def _noise_option(model: StatisticalModel) -> str:
-    """Return the option for the noise of the fit, which the new test has, too; empty where nothing need be said."""
+def _noise_option(model: StatisticalModel, mode: str) -> str:
+    """Return the option for the noise of the fit, and of a new test in a mode; empty where nothing need be said."""
     noise, tests = model.noise, model.experiment.tests
     if noise.parameters:
         return f" --noise {noise.name}" * (noise.name != UnknownNoise.name)
     sds = noise.of_tests(model.experiment) * np.sqrt([test.curves[0].averaged for test in tests])
     units = [stress_unit(test.stress_unit).to_mpa for test in tests]
-    of_new = np.exp(np.log(sds).mean()) / units[0]
+    of_mode = sds[[test.mode.name == mode for test in tests]]
+    of_new = np.exp(np.log(of_mode if len(of_mode) else sds).mean()) / units[0]
     is_one_for_all = len({*zip(sds, units, strict=True)}) == 1
     of_each = [of_new] if is_one_for_all else [*(sds / units), of_new]
     return " --noise-sd " + ",".join(f"{sd:g}" for sd in of_each)
