@@ -7,6 +7,7 @@ import shutil
 
 import pytest
 
+import tissuq as tq
 from marks import slow_but
 
 from .conftest import fitted_in, rows_of
@@ -83,6 +84,14 @@ def test_a_run_is_compared_once(refused, here):
 
 def test_a_file_that_is_no_posterior_is_named_and_refused(refused, here):
     (here / "broken.nc").write_text("nothing")
+    refused(["'broken.nc' is damaged or no posterior of tissuq"], "compare", "broken.nc")
+
+
+def test_a_posterior_with_damaged_attributes_is_named_and_refused(refused, here):
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+    tq.fit(data, discrepancy="none", noise_sd=0.02).save(here / "broken.nc")
+    content = (here / "broken.nc").read_bytes()
+    (here / "broken.nc").write_bytes(content.replace(b"log_evidence", b"log_EVIDENCE"))  # HDF5 keeps a sum of them
     refused(["'broken.nc' is damaged or no posterior of tissuq"], "compare", "broken.nc")
 
 

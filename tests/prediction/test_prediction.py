@@ -225,3 +225,33 @@ def test_a_band_of_some_draws_is_that_of_all():
     low, high = np.quantile(stress, [0.025, 0.975], axis=0)
     np.testing.assert_allclose(band.low, low, atol=0.01 * (high - low).max())
     np.testing.assert_allclose(band.high, high, atol=0.01 * (high - low).max())
+
+
+def test_a_band_of_all_draws_of_a_sampler_has_the_ends_of_its_parameters():
+    """Along an axis on which draws differ as along others some of them are any of them: ends a seventh off."""
+    model = gallery.fit(DATA, material="yeoh", discrepancy="none", noise_sd=0.2).solution
+    values = np.random.default_rng(1).standard_t(4, (4000, 3)) * [0.02, 0.01, 0.001] + [1.2, -0.05, 0.004]
+    points = GaussianMixture.of_points(np.zeros((4000, 0)), values)
+    drawn = replace(model, representation=Representation.of(points), sampled=values.reshape(4, 1000, 3))
+    stretch = np.array([0.6, 1.2, 2.2])
+    excess = stretch**2 + 2 / stretch - 3
+    stress = values @ (x(stretch) * np.stack([np.ones(3), 2 * excess, 3 * excess**2]))
+    low, high = np.quantile(stress, [0.025, 0.975], axis=0)
+    band = predict_band(drawn, stretch, noise=False)
+    assert np.abs(np.stack([band.low - low, band.high - high]) / (high - low)).max() < 0.005
+
+
+def test_a_band_beyond_the_data_has_draws_where_the_posterior_has_weight():
+    """Every component had as many draws as any other, and one with nearly all of the weight a handful."""
+    fitted = gallery.fit(DATA, discrepancy="auto-isotropic", noise_sd=0.2).solution
+    heaviest = np.argsort(fitted.mixture.weights)[::-1][:1000]
+    weights = np.r_[0.999, np.full(999, 1e-3 / 999)]
+    one, many = (
+        predict_band(replace(fitted, representation=Representation.of(mixture)), [0.5, 2.5, 3.0], noise=False)
+        for mixture in (
+            fitted.mixture[heaviest[:1]].weighted(np.ones(1)),
+            fitted.mixture[heaviest].weighted(weights),
+        )
+    )
+    for name in ("median", "low", "high"):  # of 6000 draws, ends known to 2 or 3 % of the width
+        np.testing.assert_allclose((vars(many)[name] - vars(one)[name]) / (one.high - one.low), 0, atol=0.08)

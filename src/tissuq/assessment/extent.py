@@ -51,7 +51,7 @@ class Assessment:
         ends of its 95 % interval.
     initial_share : tuple of float
         Share of the initial stiffness that the discrepancy carries, likewise: the largest error of the parameter.
-        Zero for an energy discrepancy.
+        Of several tests, in the one where it is largest; zero for an energy discrepancy.
     modulus : tuple of float
         The material's initial shear modulus, MPa: mean, and the ends of its 95 % HDI.
     modulus_symbols, other_symbols : tuple of str

@@ -28,7 +28,9 @@ _SHARES: WeakKeyDictionary[Solution, tuple[Share, Share]] = WeakKeyDictionary()
 def shares_of_discrepancy(solution: Solution) -> tuple[Share, Share]:
     """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals.
 
-    Remembered as long as the posterior is there, as answers, assessments and populations ask for them.
+    A discrepancy of the stress is another in each of several tests: of these, the test in which its mean share of the
+    initial stiffness is largest counts. Remembered as long as the posterior is there, as answers, assessments and
+    populations ask for them.
     """
     if solution not in _SHARES:
         _SHARES[solution] = _computed(solution)
@@ -37,18 +39,26 @@ def shares_of_discrepancy(solution: Solution) -> tuple[Share, Share]:
 
 def _computed(solution: Solution) -> tuple[Share, Share]:
     experiment, components = solution.model.experiment, solution.mixture
-    mode = experiment.curves[0].mode
-    reference = experiment.states_at(mode.excursion([-STRETCH_STEP, STRETCH_STEP]), mode)
-    states = States.joined([_even(experiment.states), reference])
+    measured = _even(experiment.states)
+    beside_rest = [
+        experiment.states_of(test.curves[0], test.curves[0].mode.excursion([-STRETCH_STEP, STRETCH_STEP]))
+        for test in experiment.tests
+    ]
     material_stress, discrepancy_stress = drawn_curves(
-        solution.model, components[systematic(components.weights[None], SHARE_DRAWS)[0]], states
+        solution.model,
+        components[systematic(components.weights[None], SHARE_DRAWS)[0]],
+        States.joined([measured, *beside_rest]),
     )
+    count = len(measured)
     size = np.sqrt(
-        (discrepancy_stress[:, :-2] ** 2).mean(axis=1)
-        / ((material_stress + discrepancy_stress)[:, :-2] ** 2).mean(axis=1)
+        (discrepancy_stress[:, :count] ** 2).mean(axis=1)
+        / ((material_stress + discrepancy_stress)[:, :count] ** 2).mean(axis=1)
     )
-    slope, material_slope = (curve[:, -1] - curve[:, -2] for curve in (discrepancy_stress, material_stress))
-    return _mean_and_ends(size), _mean_and_ends(slope / (slope + material_slope))
+    slopes, material_slopes = (
+        curve[:, count + 1 :: 2] - curve[:, count::2] for curve in (discrepancy_stress, material_stress)
+    )
+    shares = map(_mean_and_ends, (slopes / (slopes + material_slopes)).T)
+    return _mean_and_ends(size), max(shares, key=lambda share: abs(share[0]))
 
 
 def _even(states: States) -> States:

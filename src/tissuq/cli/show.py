@@ -143,6 +143,7 @@ def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:
     import xarray as xr
 
     from tissuq.posterior.archive import unreadable
+    from tissuq.posterior.netcdf import opened
 
     files: dict[str, Path] = {}
     if len({run.resolve() for run in runs}) < len(runs):
@@ -157,8 +158,9 @@ def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:
     trees: dict[str, xr.DataTree] = {}
     for name, path in files.items():
         try:
-            trees[name] = xr.open_datatree(path, engine="h5netcdf").load()
-        except (OSError, ValueError, KeyError) as error:
+            with opened(path):
+                trees[name] = xr.open_datatree(path, engine="h5netcdf").load()
+        except Exception as error:  # whatever a damaged file makes the readers of HDF5 raise
             raise unreadable(path, error) from error
         trees[name].attrs |= _assessed(path)
     return trees

@@ -133,8 +133,8 @@ def _mean_distance(mean: FloatArray, variance: FloatArray) -> FloatArray:
 
 STRETCHES_OF_BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
-COMPONENTS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 1500, 200
-"""Components that stand for the posterior at a block of stretches, and at more."""
+COMPONENTS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 4000, 200
+"""Components that stand for the posterior at a block of stretches, as many as samplers draw, and at more."""
 
 
 @dataclass(frozen=True, eq=False)

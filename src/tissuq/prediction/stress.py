@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from tissuq.arrays import FloatArray
+from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.mechanics.equilibrium import has_free_axis
-from tissuq.mechanics.rays import Range, drawn_back, share_to_end
+from tissuq.mechanics.rays import TINY, Range, drawn_back, share_to_end
 from tissuq.mechanics.stress import stresses_by_basis
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import drawn_stress, slopes_of, stress_moments, stresses_beyond, values_of
@@ -60,7 +60,7 @@ class Stress:
         if (shares == 1).all():
             return self.components, mean, variance
         drawn, probability = self._drawn
-        mean, variance = (np.repeat(moment, len(drawn) // len(mean), axis=0) for moment in (mean, variance))
+        mean, variance = (np.repeat(moment, self._copies, axis=0) for moment in (mean, variance))
         for index, stress in stresses_beyond(self.model, drawn, states, probability):
             mean[index], variance[index] = stress, 0.0
         return drawn, mean, variance
@@ -110,21 +110,22 @@ class Stress:
         return [limits for limits, _ in self.model.by_limits(member)]
 
     @cached_property
+    def _copies(self) -> IndexArray:
+        """How many draws (M,) stand for each component, in proportion to its weight, so that none counts for many."""
+        weights = self.components.weights
+        return np.asarray(np.maximum(1, np.ceil(MIN_DRAWS * weights / max(weights.sum(), TINY))), dtype=np.intp)
+
+    @cached_property
     def _drawn(self) -> tuple[GaussianMixture, FloatArray]:
-        """Several draws of every component, and probabilities of the errors of their exponents."""
+        """Draws of every component, and probabilities of the errors of their exponents."""
         from scipy.special import ndtri
 
-        count, scores = len(self.components), self.components.root.shape[2]
-        copies = -(-MIN_DRAWS // count)
+        copies, scores = self._copies, self.components.root.shape[2]
         # A Latin hypercube of our own, as importing `scipy.stats` for one takes a tenth of the time of a fit.
-        generator, cells = np.random.default_rng(0), np.tile(np.arange(count * copies), (scores + 1, 1))
-        uniform = (generator.permuted(cells, axis=1) + generator.random(cells.shape)).T / (count * copies)
-        weights, settings, mean = (
-            np.repeat(array, copies, axis=0)
-            for array in (self.components.weights / copies, self.components.settings, self.components.mean)
-        )
-        member = None if self.components.member is None else np.repeat(self.components.member, copies)
-        spread = self.components.root @ ndtri(uniform[:, 1:]).reshape(count, copies, scores).swapaxes(1, 2)
-        values = mean + spread.swapaxes(1, 2).reshape(mean.shape)
+        generator, cells = np.random.default_rng(0), np.tile(np.arange(copies.sum()), (scores + 1, 1))
+        uniform = (generator.permuted(cells, axis=1) + generator.random(cells.shape)).T / copies.sum()
+        drawn = self.components[np.repeat(np.arange(len(copies)), copies)]
+        values = drawn.mean + np.einsum("mps,ms->mp", drawn.root, ndtri(uniform[:, 1:]))
+        weights, no_root = drawn.weights / np.repeat(copies, copies), np.zeros((*values.shape, 0))
         probability = uniform[:, 0] if self.errs_beyond else np.full(len(uniform), 0.5)
-        return GaussianMixture(weights, settings, values, np.zeros((*values.shape, 0)), member), probability
+        return replace(drawn, weights=weights, mean=values, root=no_root), probability
