@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from command_line import done_in, run_in
 from tissuq.studies.calibration import _are_proportional, _stresses_of_specimens
 
-from .conftest import command, done_in, rows_of, run_in, tree
+from .conftest import rows_of, tree
 
 MODEL = """
 import numpy as np
@@ -155,11 +156,10 @@ def test_lines_are_left_out_as_the_message_says(calibrate_run, tmp_path):
 def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate_run):
     folder, _ = calibrate_run
     again = ["--config", "run/run.toml", "--no-figures", "--out", "again"]
-    refused = command("calibrate", *again, folder=folder)
+    refused = run_in(folder, "calibrate", *again)
     assert refused.status == 2
     assert "used only if named here, too; if you know them, add --forward input/force.py:force" in refused.err
-    said = command("calibrate", "--forward", "run/input/force.py:force", *again, folder=folder)
-    assert said.status == 0, said.err
+    done_in(folder, "calibrate", "--forward", "run/input/force.py:force", *again)
     assert (folder / "again" / "summary.csv").read_bytes() == (folder / "run" / "summary.csv").read_bytes()
 
 
