@@ -59,5 +59,5 @@ def scaled(stretch: Array, psi: float, ends: tuple[float, float], strength: floa
     every = np.concatenate([stretch, line])
     K = squared_exponential(every, every, psi)
     precision = strength * np.concatenate([np.zeros(len(stretch)), weights])
-    found = np.linalg.solve(np.eye(len(every)) + K * precision, K)
-    return found[: len(stretch), : len(stretch)]
+    found = np.linalg.solve(np.eye(len(every)) + K * precision, K[:, : len(stretch)])
+    return found[: len(stretch)]

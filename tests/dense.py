@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -91,22 +92,41 @@ class Problem:
 
 @dataclass(frozen=True)
 class Dense:
-    """What the quadrature finds; ``density`` is that of the wanted linear parameter on ``grid``."""
+    """What the quadrature finds; ``mean``, ``sd`` and ``hdi`` are those of the wanted linear parameter.
+
+    ``of_wanted`` returns nodes, their weights and its density there, which takes longer than all else.
+    """
 
     log_evidence: float
     means: dict[str, float]
     sds: dict[str, float]
-    mean: float
-    sd: float
-    hdi: tuple[float, float]
-    grid: Array
-    density: Array
     weights: Array
     settings: dict[str, Array]
+    of_wanted: Callable[[], tuple[Array, Array, Array]]
+
+    @cached_property
+    def _wanted(self) -> tuple[Array, Array, Array]:
+        return self.of_wanted()
+
+    @property
+    def mean(self) -> float:
+        grid, steps, density = self._wanted
+        return float(steps @ (density * grid)) / float(steps @ density)
+
+    @property
+    def sd(self) -> float:
+        grid, steps, density = self._wanted
+        return float(np.sqrt(steps @ (density * (grid - self.mean) ** 2) / (steps @ density)))
+
+    @cached_property
+    def hdi(self) -> tuple[float, float]:
+        grid, _, density = self._wanted
+        return shortest(grid, density)
 
     def mass(self, low: float, high: float) -> float:
         """Return the probability of the wanted parameter between two values."""
-        fine, value = _finely(self.grid, self.density)
+        grid, _, density = self._wanted
+        fine, value = _finely(grid, density)
         below = cumulative(fine, value)
         return float(np.diff(np.interp([low, high], fine, below))[0])
 
@@ -186,16 +206,13 @@ def integrate(problem: Problem, wanted: str = "", refine: float = 1.0, nodes: in
     weights /= weights.sum()
     means = {name: float(weights @ h[name]) for name in names}
     sds = {name: float(np.sqrt(weights @ (h[name] - means[name]) ** 2)) for name in names}
-    if not problem.linear:
-        return Dense(log_evidence, means, sds, np.nan, np.nan, (np.nan, np.nan), *np.zeros((2, 0)), weights, h)
-    first = list(problem.linear).index(wanted or next(iter(problem.linear)))
-    used = heavy & (total > top - NEGLIGIBLE)
-    grid, steps, density = _density(
-        log[used] - log_evidence, mean[used], covariance[used], bounds, first, order, refine
-    )
-    centre = float(steps @ (density * grid)) / float(steps @ density)
-    sd = float(np.sqrt(steps @ (density * (grid - centre) ** 2) / (steps @ density)))
-    return Dense(log_evidence, means, sds, centre, sd, shortest(grid, density), grid, density, weights, h)
+
+    def of_wanted() -> tuple[Array, Array, Array]:
+        first = list(problem.linear).index(wanted or next(iter(problem.linear)))
+        used = heavy & (total > top - NEGLIGIBLE)
+        return _density(log[used] - log_evidence, mean[used], covariance[used], bounds, first, order, refine)
+
+    return Dense(log_evidence, means, sds, weights, h, of_wanted)
 
 
 def log_box_mass(mean: Array, covariance: Array, bounds: Array, order: int, log_weights: Array) -> Array:
@@ -306,10 +323,10 @@ def _density(
     if low >= high:  # all Gaussians lie beyond a bound
         low, high = bounds[place]
     for _ in range(3):
-        grid = np.linspace(low, high, 201)
+        grid = np.linspace(low, high, 61)
         density = _density_at(grid, log, mean, covariance, bounds, place, order // 2)
         seen = np.flatnonzero(density > density.max() * np.exp(-NEGLIGIBLE))
-        low, high = grid[max(seen[0] - 1, 0)], grid[min(seen[-1] + 1, 200)]
+        low, high = grid[max(seen[0] - 1, 0)], grid[min(seen[-1] + 1, 60)]
     # Close where most of the density is, however far its tails reach.
     order_of_sd = np.argsort(sd)
     shares = np.cumsum(np.exp(log - log.max())[order_of_sd])

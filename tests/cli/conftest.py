@@ -11,27 +11,15 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterable
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 import pytest
 import typer.main
 
+from command_line import Outcome, done_in
 from tissuq.cli import main
 
 from .models import write_model
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a command left: its exit status and what it said."""
-
-    status: int
-    out: str
-    err: str
-
 
 Cli = Callable[..., Outcome]
 
@@ -121,25 +109,6 @@ def command(*arguments: object, folder: Path) -> Outcome:
         cwd=folder, capture_output=True, text=True, env={**os.environ, "COLUMNS": "80"}, check=False,
     )  # fmt: skip
     return Outcome(done.returncode, done.stdout, done.stderr)
-
-
-def run_in(folder: Path, *arguments: object) -> Outcome:
-    """Run ``tissuq ARGUMENTS`` in this process, in a folder: for fixtures that outlive a test."""
-    out, err = StringIO(), StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.chdir(folder)
-        patch.setenv("COLUMNS", "80")
-        patch.setattr(sys, "argv", ["tissuq", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            main()
-    return Outcome(int(end.value.code or 0), out.getvalue(), err.getvalue())
-
-
-def done_in(folder: Path, *arguments: object) -> Outcome:
-    """Run a command that ends well in this process, in a folder."""
-    said = run_in(folder, *arguments)
-    assert said.status == 0, said.err
-    return said
 
 
 def fitted_in(folder: Path, *options: object) -> Outcome:

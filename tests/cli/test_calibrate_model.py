@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from command_line import done_in
 
-from .conftest import done_in, rows_of, write_specimen
+from .conftest import rows_of, write_specimen
 from .models import killed_after, started, write_model
 
 TIMES = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0])

@@ -12,13 +12,14 @@ import pytest
 import xarray as xr
 
 import tissuq as tq
+from command_line import done_in, run_in
 from tissuq.experiments.reading.findings import experiment_of
 from tissuq.population.warnings import warnings_of_tests
 from tissuq.result_warning import merged
 from tissuq.studies import population
 from tissuq.studies.population import PopulationSettings
 
-from .conftest import STRETCH, command, done_in, rows_of, run_in
+from .conftest import STRETCH, rows_of
 from .models import write_model
 
 MODULI_KPA = [40.0, 48.0, 52.0, 60.0, 75.0, 45.0]
@@ -202,11 +203,9 @@ def test_a_run_is_repeated_from_its_own_folder_and_from_one_file(population_run)
     folder, _ = population_run
     expected = (folder / "run" / "population.csv").read_bytes()
     options = ["--no-figures", "--out"]
-    again = command("population", "--config", "run/run.toml", *options, "again", folder=folder)
-    assert again.status == 0, again.err
+    done_in(folder, "population", "--config", "run/run.toml", *options, "again")
     assert (folder / "again" / "population.csv").read_bytes() == expected
-    one = command("population", "all.csv", "--specimen", "specimen", *OPTIONS, *options, "one", folder=folder)
-    assert one.status == 0, one.err
+    done_in(folder, "population", "all.csv", "--specimen", "specimen", *OPTIONS, *options, "one")
     assert (folder / "one" / "population.csv").read_bytes() == expected
     recipe = tomllib.loads((folder / "one" / "run.toml").read_text())
     assert recipe["files"] == ["input/all.csv"]

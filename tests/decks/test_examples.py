@@ -14,6 +14,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import tissuq as tq
+from command_line import done_in
 from tissuq.decks import Deck, parse_quantity
 from tissuq.decks.abaqus import AbaqusDeck
 from tissuq.decks.calculix_results import read_frd
@@ -275,10 +276,10 @@ def test_skin_on_fat_has_the_force_and_the_surface_that_felupe_finds_on_its_mesh
     assert abs(exchanged["force"] / found["force"] - 1) > 0.5
 
 
-def test_from_data_to_the_band_of_a_force_with_the_fields(cli_in, tmp_path):
+def test_from_data_to_the_band_of_a_force_with_the_fields(tmp_path):
     """The commands of docs/ensembles.md with few draws."""
     shutil.copy(EXAMPLES / "plate.inp", tmp_path)
-    assert cli_in(tmp_path, "fit", "brain-cortex-uniaxial", "--no-figures", "--out", "runs/brain") == 0
+    done_in(tmp_path, "fit", "brain-cortex-uniaxial", "--no-figures", "--out", "runs/brain")
     options = [
         "--material",
         "TISSUE",
@@ -291,7 +292,7 @@ def test_from_data_to_the_band_of_a_force_with_the_fields(cli_in, tmp_path):
         "--max-jobs",
         2,
     ]
-    assert cli_in(tmp_path, "ensemble", "runs/brain", "plate.inp", *options) == 0
+    done_in(tmp_path, "ensemble", "runs/brain", "plate.inp", *options)
     folder = tmp_path / "runs" / "brain-plate"
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["quantities"]["force"]["parameters"] + summary["quantities"]["force"][

@@ -100,14 +100,9 @@ KINDS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("discrepancy", "seed", "methods"),
-    [
-        ("constant", 0, ("smc",)),
-        *(pytest.param(name, seed, ("nuts", "smc"), marks=pytest.mark.slow) for name in KINDS for seed in range(3)),
-    ],
-)
-def test_exact_nuts_and_smc_agree(discrepancy, seed, methods):
+@pytest.mark.parametrize("discrepancy", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_exact_nuts_and_smc_agree(discrepancy, seed):
     """The short version of NUTS is in `test_sampled.py`."""
     # Five standard errors for every number: 6 cases, fewer than 8 numbers each, false chance below 1e-4.
     generator = np.random.default_rng([seed, 8])
@@ -115,7 +110,7 @@ def test_exact_nuts_and_smc_agree(discrepancy, seed, methods):
     stress = columns_of({"C10": generator.uniform(0.3, 2), "C20": generator.normal(0, 0.1)}, stretch)
     data = tq.Experiment("uniaxial", stretch, stress + 0.1 * generator.standard_normal(10))
     options = {"discrepancy": discrepancy, "noise_sd": 0.1, "priors": KINDS[discrepancy]}
-    exact, *all_sampled = (tq.fit(data, method=method, seed=seed, **options) for method in ("exact", *methods))
+    exact, *all_sampled = (tq.fit(data, method=method, seed=seed, **options) for method in ("exact", "nuts", "smc"))
     smc = all_sampled[-1]
     error = np.hypot(smc.log_evidence_error, exact.log_evidence_error)
     assert error < 0.3

@@ -148,6 +148,9 @@ def test_designs_are_reduced_at_once_as_one_by_one(terms):
         assert reduction.counts.sum() == alone.counts.sum()
         for name in ("inverse", "log_size", "centre"):
             np.testing.assert_allclose(getattr(reduction, name), getattr(alone, name), rtol=1e-9, atol=1e-12)
+        for each, squares in zip((found, other), reduction.squares[:, 0], strict=True):
+            rest = each.stress - design @ np.linalg.lstsq(design, each.stress)[0]
+            assert squares[-1] == pytest.approx(rest @ rest, rel=1e-9)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import permutations
+from itertools import permutations, product
 
 import numpy as np
 import pytest
@@ -79,15 +79,9 @@ def test_independent_parameters_have_the_product_of_their_masses():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("k", "shift", "size"),
-    [
-        *((2, shift, 40_000) for shift in (0.0, 3.0, 30.0)),
-        (3, 3.0, 10_000),
-        *(pytest.param(3, shift, 40_000, marks=pytest.mark.slow) for shift in (0.0, 3.0, 30.0)),
-    ],
-)
-def test_draws_have_the_moments_of_the_bounded_gaussian(k, shift, size):
+@pytest.mark.parametrize(("k", "shift"), list(product((2, 3), (0.0, 3.0, 30.0))))
+def test_draws_have_the_moments_of_the_bounded_gaussian(k, shift):
+    size = 40_000
     covariance = (0.8 * np.ones((k, k)) + 0.2 * np.eye(k))[None]
     triangle, low, high = np.linalg.cholesky(covariance), np.full((1, k), shift), np.full((1, k), np.inf)
     uniforms = np.random.default_rng(0).random((1, size, k))

@@ -71,15 +71,6 @@ def below(discrepancy, count):
     )
 
 
-@pytest.mark.slow
-def test_few_data_sets_of_all_models_together_are_calibrated_and_a_fault_of_a_quarter_is_caught():
-    """40 of each of seven models: 25 % is at least 4.2 standard errors of the variance of 280 scores."""
-    pit = np.concatenate([below(discrepancy, 40) for discrepancy in COUNTS])
-    assert min(p_values(pit)) > SIZE
-    for factor in (0.75, 1.25):
-        assert p_values(narrowed(pit, factor))[1] < SIZE
-
-
 @pytest.mark.statistical
 @pytest.mark.parametrize("discrepancy", list(COUNTS))
 def test_the_exact_posterior_of_c10_is_calibrated(discrepancy):

@@ -21,10 +21,19 @@ def specimens(unit, moduli=MODULI):
     }
 
 
-@pytest.fixture(scope="module", params=["kPa", "Pa"])
-def both(request):
+def population_in(unit):
     options = {"material": "yeoh", "parameters": ("C10", "C20"), "discrepancy": "none", "noise_sd": 0.01}
-    return request.param, *(tq.fit_population(specimens(unit), **options) for unit in ("MPa", request.param))
+    return tq.fit_population(specimens(unit), **options)
+
+
+@pytest.fixture(scope="module")
+def in_mpa():
+    return population_in("MPa")
+
+
+@pytest.fixture(scope="module", params=["kPa", "Pa"])
+def both(request, in_mpa):
+    return request.param, in_mpa, population_in(request.param)
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from command_line import done_in
 from tissuq.errors import InputError
 from tissuq.finite_elements import ClampedBar, simulate
 from tissuq.studies.stream import open_pool
@@ -19,17 +20,12 @@ SIZES = {"fineness": 0.5, "elongation": 0.8}
 @pytest.fixture(scope="module")
 def settings(tmp_path_factory):
     """Of a run of ``tissuq fit`` with the discrepancy 'taylor'."""
-    import os
-    import subprocess
-    import sys
-
     folder = tmp_path_factory.mktemp("run")
     stretch = np.array([0.8, 0.9, 0.95, 1.05, 1.1, 1.2])
     stress = tq.simulate("yeoh", {"C10": 1.0, "C20": 1.0, "C30": 0.0}, stretch, noise_sd=0.01, seed=1).stress
     rows = "".join(f"{at},{each}\n" for at, each in zip(stretch, stress, strict=True))
     (folder / "tissue.csv").write_text(f"stretch,stress_kPa\n{rows}", encoding="utf-8")
-    command = [sys.executable, "-m", "tissuq", "fit", "tissue.csv", "--discrepancy", "taylor", "--no-figures"]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True, env=dict(os.environ))
+    done_in(folder, "fit", "tissue.csv", "--discrepancy", "taylor", "--no-figures")
     return SimulationSettings(run=str(folder / "runs" / "tissue"), case="bar", sizes=SIZES, draws=3, steps=2)
 
 

@@ -8,7 +8,6 @@ from pydantic import ValidationError
 from scipy.special import ndtr, ndtri
 from scipy.stats import binomtest, kstest
 
-from marks import slow_but
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import engineering_stress
 from tissuq.model.discrepancy import discrepancies
@@ -34,10 +33,9 @@ def settings_of(**changes):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("repeats", slow_but([400], [400, 1500]))
 @pytest.mark.parametrize("test", [shape_p_value, spread_p_value])
-def test_the_tests_have_the_size_that_they_say(test, repeats):
-    generator = np.random.default_rng(0)
+def test_the_tests_have_the_size_that_they_say(test):
+    generator, repeats = np.random.default_rng(0), 1500
     rejected = sum(test(generator.uniform(size=60)) <= 0.05 for _ in range(repeats))
     assert binomtest(rejected, repeats, 0.05).pvalue > SIZE
 
@@ -92,13 +90,9 @@ def test_parameters_are_drawn_from_their_priors_and_data_from_the_model(formulat
         assert np.mean(left) == pytest.approx(1.0, abs=4.5 * np.std(left) / 20)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "replicates",
-    [20, pytest.param(40, marks=pytest.mark.slow), pytest.param(150, marks=pytest.mark.statistical)],
-)
-def test_quick_formulations_are_calibrated(tmp_path, replicates):
-    settings = settings_of(formulations=["constant", "yeoh", "taylor"], replicates=replicates, seed=4)
+@pytest.mark.statistical
+def test_quick_formulations_are_calibrated(tmp_path):
+    settings = settings_of(formulations=["constant", "yeoh", "taylor"], replicates=150, seed=4)
     table = summarise_ranks(settings, run_sbc(settings, tmp_path))
     assert table["calibrated"].all()  # fails with a chance of 5 % over seeds; this one is fixed
     assert not table["failed"].any()
@@ -116,9 +110,8 @@ def test_noise_told_to_be_less_than_it_is_is_caught(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("replicates", slow_but([20], [20, 60]))
-def test_results_do_not_depend_on_workers_and_are_streamed(tmp_path, replicates):
-    settings = settings_of(formulations=["none", "zero-modulus"], replicates=replicates)
+def test_results_do_not_depend_on_workers_and_are_streamed(tmp_path):
+    settings = settings_of(formulations=["none", "zero-modulus"], replicates=60)
     contents = []
     for workers in (1, 2):
         folder = tmp_path / str(workers)
