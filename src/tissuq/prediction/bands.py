@@ -133,8 +133,9 @@ def _mean_distance(mean: FloatArray, variance: FloatArray) -> FloatArray:
 
 STRETCHES_OF_BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
-COMPONENTS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 4000, 200
-"""Components that stand for the posterior at a block of stretches, as many as samplers draw, and at more."""
+COMPONENTS_OF_BLOCK, DRAWS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 1500, 4000, 200
+"""Components that stand for the posterior at a block of stretches, draws that stand for that of a sampler, which are in
+no order, and components at more blocks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,11 +270,11 @@ def predictive_mixtures(
 
     They are those of a new test, or of a measured ``curve``, as `predict_band` says.
     """
-    count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
-    mixture = [
-        (solution.model, (thinned := solution.thinned(count).merged()).weighted(weight * thinned.weights))
-        for weight, solution in weighted_solutions
-    ]
+    mixture = []
+    for weight, solution in weighted_solutions:
+        count = COMPONENTS_OF_BLOCK if solution.sampled is None else DRAWS_OF_BLOCK
+        thinned = solution.thinned(COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else count).merged()
+        mixture.append((solution.model, thinned.weighted(weight * thinned.weights)))
     for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
         moments = [
             _moments(Stress(model, components, discrepancy, errs_beyond), block, mode, channel, curve, noises=noises)
