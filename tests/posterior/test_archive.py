@@ -203,6 +203,11 @@ def test_a_damaged_or_foreign_file_is_said(tmp_path):
         path.write_bytes(content)
         with pytest.raises(tq.InputError, match="is damaged or no posterior of tissuq"):
             tq.Posterior.load(path)
+    means = posterior.solution.mixture.mean.tobytes()
+    assert whole.count(means) == 1
+    path.write_bytes(whole.replace(means, means[:-2] + bytes([means[-2] ^ 1]) + means[-1:]))  # one bit of one number
+    with pytest.raises(tq.InputError, match="is damaged or no posterior of tissuq"):
+        tq.Posterior.load(path)
     posterior.data.to_netcdf(path, engine="h5netcdf")
     with pytest.raises(tq.InputError, match="holds draws, and not the whole posterior"):
         tq.Posterior.load(path)

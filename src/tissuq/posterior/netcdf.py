@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 COMPRESSED_SIZE, SAMPLE_SIZE, MAX_SHRUNK_SHARE = 1000, 4000, 0.75
 """Number of values in an array from which it is compressed, if so many of its values then shrink to such a share."""
 COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+CHECKSUM = {"fletcher32": True}
+"""Of every array, by which the HDF5 library refuses to read one that is damaged on a disk."""
 NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable. {:9d}"
 """Name of a scale that is a dimension without coordinates."""
 
@@ -65,7 +67,8 @@ class LabelledGroup:
             dims, array = (along,) if isinstance(along, str) else tuple(along), np.asarray(values)
             array = array.astype(h5py.string_dtype()) if array.dtype.kind == "U" else array
             packed = COMPRESSION if array.size > COMPRESSED_SIZE and _shrinks(array) else {}
-            variable = group.create_dataset(name, data=array, **packed)
+            checked = CHECKSUM if array.size and array.ndim and array.dtype.kind in "fiub" else {}
+            variable = group.create_dataset(name, data=array, **packed, **checked)
             _write_attributes(variable, *attributes)
             if dims == (name,):
                 variable.make_scale(name)
