@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 
 import numpy as np
 
@@ -105,9 +106,10 @@ class TruncatedMixture:
 
     def components(self, count: int | None = None) -> GaussianMixture:
         """Return all, or at most so many that stand for all: Gaussians, and draws in the bounds from what these cut."""
-        number = min(MIN_DRAWS, count or MIN_DRAWS)
-        are_cut = [self._drawn(gaussians, number) for gaussians in (*self.cut.values(), self.crossed) if len(gaussians)]
-        return GaussianMixture.of_all([self.free, *are_cut], count)
+        groups = [gaussians for gaussians in (*self.cut.values(), self.crossed) if gaussians.weights.sum() > 0]
+        total = self.gaussians.weights.sum()
+        draws = (min(MIN_DRAWS, ceil(count * g.weights.sum() / total)) if count else MIN_DRAWS for g in groups)
+        return GaussianMixture.of_all([self.free, *map(self._drawn, groups, draws)], count)
 
     def checked_masses(self, symbols: Sequence[str]) -> tuple[FloatArray, float]:
         """Return the log masses within bounds of components that these cut notably, and the error of all.

@@ -17,7 +17,7 @@ import numpy as np
 
 from tissuq.arrays import FloatArray, IndexArray
 from tissuq.errors import ModelError
-from tissuq.inference.box import NEGLIGIBLE_MASS, Boxes
+from tissuq.inference.box import Boxes
 from tissuq.inference.enumerators.amplitudes import (
     NEGLIGIBLE_SHARE,
     Points,
@@ -167,14 +167,14 @@ class _EnergySums:
         self._priors = LinearPriors(model)
         self._box = self._priors.box
         mean, root, _ = self._priors.times(self._bare[0], self._bare[1] * points.noise_sd[:, None, None])
-        mass_outside, log_weight = self._box.beyond(mean, root), points.log_weight + log_weights[self._node]
-        is_near = mass_outside.sum(axis=1) > TOUCHED_MASS
+        log_weight = points.log_weight + log_weights[self._node]
+        is_near = self._box.beyond(mean, root).sum(axis=1) > TOUCHED_MASS
         if mean.shape[1] > MAX_CHEAP_BOUNDS and is_near.sum() > bounded_points:
             at_most = log_weight + points.log_inside
             total = np.logaddexp.reduce(at_most)
             rows = systematic(np.exp(at_most - total)[None], bounded_points)[0]
             points, self._node, self._bare = points[rows], self._node[rows], (self._bare[0][rows], self._bare[1][rows])
-            mean, root, mass_outside, is_near = mean[rows], root[rows], mass_outside[rows], is_near[rows]
+            mean, root, is_near = mean[rows], root[rows], is_near[rows]
             log_weight = total - np.log(bounded_points) - points.log_inside
         near = np.flatnonzero(is_near)
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
@@ -188,7 +188,6 @@ class _EnergySums:
         settings = self._settings(points, self._node)
         gaussians = GaussianMixture(self._weights, settings, mean, root).resampled(MAX_MARGINAL_POINTS)
         self._truncated = TruncatedMixture(gaussians, self._box)
-        self._mass_outside = mass_outside.sum(axis=1)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not model.is_improper:
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
@@ -228,7 +227,7 @@ class _EnergySums:
     def _represented(self, power: float, count: int, few: int | None) -> GaussianMixture:
         """Return so many components that stand for all points, taken as often as a power of their weights says.
 
-        Or the ``few`` that stand for these, the others of which need not be computed where no bound cuts any.
+        Or the ``few`` that stand for these, the others of which need not be computed.
         """
         points, node, weights = self._points, self._node, self._weights
         if len(weights) > count:
@@ -240,11 +239,8 @@ class _EnergySums:
                 node[representatives],
                 weights[representatives] ** (1 - power),
             )
-            weights, outside = weights / weights.sum(), self._mass_outside[representatives]
-        else:
-            outside = self._mass_outside
-        is_free = outside.max(initial=0.0) < NEGLIGIBLE_MASS / 10
-        if few is not None and is_free and len(weights) > few:
+            weights = weights / weights.sum()
+        if few is not None and len(weights) > few:
             representatives = systematic(weights[None], few)[0]
             points, node = points[representatives], node[representatives]
             weights = np.full(few, weights.sum() / few)
