@@ -26,7 +26,7 @@ demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain 
 	@echo "  the paper's study:  $(abspath $(RUNS))/paper/report.html"
 	@echo "  human brain cortex: $(abspath $(RUNS))/brain/report.html"
 
-test: $(VENV)/.installed-dev  ## Run the quick tests (five to seven minutes on two cores)
+test: $(VENV)/.installed-dev  ## Run the quick tests (four to five minutes on two cores)
 	$(PYTEST) -m 'not ($(LONG))'
 
 test-rest: $(VENV)/.installed-dev  ## Run the tests that `make test` leaves out
