@@ -215,15 +215,11 @@ class ErrorModel:
         return np.append(of_curves, 1.0)[states.curve]  # the last one is of what no test has measured
 
     def noise_of_new_test(self, mode: LoadingMode) -> float:
-        """Return the noise of a new test in a mode over noise_sd: the geometric mean of that of the tests in it.
-
-        One, which is the geometric mean of all, where no test is in that mode.
-        """
+        """Return the noise of a new test in a mode over noise_sd: what is `typical` of the tests in it."""
         if len(self.experiment.tests) == 1:
             return 1.0
         noise_sd, mean_sd = self.noise_of_tests
-        of_mode = noise_sd[[test.mode == mode for test in self.experiment.tests]]
-        return float(np.exp(np.log(of_mode / mean_sd).mean())) if len(of_mode) else 1.0
+        return typical(noise_sd, [test.mode == mode for test in self.experiment.tests]) / mean_sd
 
     @property
     def common_error(self) -> float:
@@ -281,3 +277,8 @@ class ErrorModel:
     def relative_variance(self, states: States, values: Mapping[str, Any]) -> Any:
         """Return the (n,) diagonal of `correlation`."""
         return self.discrepancy.relative_variance(states, values)
+
+
+def typical(sizes: FloatArray, are_alike: Sequence[bool]) -> float:
+    """Return the geometric mean of sizes (tests,) of the tests that are alike; of all tests where none is."""
+    return float(np.exp(np.log(sizes[list(are_alike)] if any(are_alike) else sizes).mean()))

@@ -14,6 +14,7 @@ import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
 from tissuq.experiments.units import stress_unit
+from tissuq.model.error_model import typical
 from tissuq.model.noise import UnknownNoise
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 from tissuq.next_test.ranking import TIED
@@ -91,8 +92,7 @@ def _noise_option(model: StatisticalModel, mode: str) -> str:
         return f" --noise {noise.name}" * (noise.name != UnknownNoise.name)
     sds = noise.of_tests(model.experiment) * np.sqrt([test.curves[0].averaged for test in tests])
     units = [stress_unit(test.stress_unit).to_mpa for test in tests]
-    of_mode = sds[[test.mode.name == mode for test in tests]]
-    of_new = np.exp(np.log(of_mode if len(of_mode) else sds).mean()) / units[0]
+    of_new = typical(sds, [test.mode.name == mode for test in tests]) / units[0]
     is_one_for_all = len({*zip(sds, units, strict=True)}) == 1
     of_each = [of_new] if is_one_for_all else [*(sds / units), of_new]
     return " --noise-sd " + ",".join(f"{sd:g}" for sd in of_each)

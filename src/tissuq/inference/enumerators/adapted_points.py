@@ -90,9 +90,8 @@ class AdaptedPoints:
                 f"{len(weighted.points)} points are effective. Give narrower priors, or use the method 'nuts'."
             )
         self.start = fitted_mixture(weighted.points, weighted.log_weights)
-        matters = weighted.weights > NEGLIGIBLE_WEIGHT
-        weights, settings = weighted.weights[matters], density.settings(weighted.points[matters])
-        weights = weights / weights.sum()
+        matters = (weights := weighted.weights) > NEGLIGIBLE_WEIGHT
+        weights, settings = weights[matters] / weights[matters].sum(), density.settings(weighted.points[matters])
         gaussians = density.conditional(settings[None])
         mixture = GaussianMixture(weights, settings, gaussians.mean[0], gaussians.root[0])
         truncated = TruncatedMixture(mixture, density.conditional.boxes)
