@@ -342,8 +342,9 @@ def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: fl
     """
     model = solution.model
     points = curve.points if model.condensed is None else model.condensed.points
+    points, rows = np.unique(points, axis=0, return_inverse=True)
     band = predict_band(solution, points, discrepancy=discrepancy, prob=prob, curve=curve)
-    low, high = model.at_measurements(np.column_stack([band.low, band.high])).T
+    low, high = model.at_measurements(np.column_stack([band.low, band.high])[rows.ravel()]).T
     return np.asarray((low <= curve.stress) & (curve.stress <= high))
 
 

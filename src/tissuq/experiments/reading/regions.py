@@ -89,7 +89,7 @@ class TestedStress:
     @cached_property
     def branches(self) -> list[IndexArray]:
         """The rows of loading of every cycle, without outliers."""
-        return [np.setdiff1d(cycle.rows("loading"), self.outliers) for cycle in self.cycles]
+        return [np.setdiff1d(cycle.rows("loading"), self.outliers, assume_unique=True) for cycle in self.cycles]
 
     @cached_property
     def outliers(self) -> IndexArray:
@@ -124,7 +124,7 @@ class TestedStress:
         events = []
         saturated = find_saturation(self.stress)  # equal loads hide the scatter of the others
         for rows in self._away_from_reference(end):
-            rows = np.setdiff1d(rows, saturated)
+            rows = np.setdiff1d(rows, saturated, assume_unique=True)
             slips = find_slips(self.course[rows], self.stress[rows], self.load_step or 0.0)
             events += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
         return events
@@ -259,6 +259,8 @@ def _outliers(tested: TestedStress) -> Iterator[Region]:
 def _copies(tested: TestedStress) -> Iterator[Region]:
     """Yield rows that are those from further above once more: no second cycle is equal to the last digit."""
     measured = np.vstack([tested.used.stretch, tested.used.stress])
+    if (np.diff(np.sort(measured[-1])) == 0).sum() < FEWEST_COPIED_ROWS:
+        return  # hardly two stresses are equal
     _, first_rows, number = np.unique(measured, axis=1, return_index=True, return_inverse=True)
     origin = first_rows[number.ravel()]
     is_next = (origin[1:] < np.arange(1, len(origin))) & (np.diff(origin) == 1) & (np.diff(measured[-1]) != 0)

@@ -79,10 +79,13 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """
     text = _decoded(path, _content(Path(path)))
     text = FORTRAN_EXPONENT.sub(r"\1e\2", text) if any(sign in text for sign in ("D+", "D-", "d+", "d-")) else text
-    text = LINE_END.sub("\n", without_marks(text.replace("\u2212", "-")))
-    if "\n" in text:  # without one, a return ends a line
-        text = RETURN_IN_LINE.sub("", text)
-    lines = text.replace("\r", "\n").split("\n")
+    text = without_marks(text.replace("\u2212", "-"))
+    if "\r" in text:
+        text = LINE_END.sub("\n", text)
+        if "\n" in text:  # without one, a return ends a line
+            text = RETURN_IN_LINE.sub("", text)
+        text = text.replace("\r", "\n")
+    lines = text.split("\n")
     if "|" in text or "<" in text:
         lines = ["" if NO_ROW.fullmatch(line) else FRAMED.sub(r"\1", line) for line in lines]
     if len(max(lines, key=len)) > LONGEST_LINE:
@@ -137,6 +140,8 @@ def _encodings(content: bytes) -> list[str]:
             return [encoding]
     if b"\0" in content[:2]:
         return ["utf-16-be" if content[0] == 0 else "utf-16-le"]
+    if content.isascii():
+        return ["utf-8"]
     lines = [line for line in content.splitlines() if not line.isascii()]
     sample = b"\n".join(lines[:LINES_FOR_ENCODING])
     shares = {WESTERN: SHARE_OF_WORDS} | {encoding: _share_of_words(sample, encoding) for encoding in LANGUAGES}
