@@ -62,7 +62,7 @@ def find_slack(stretch: Column, stress: Column) -> Slack | None:
         return None
     order = np.argsort(way, kind="stable")
     way, load = way[order], stress[order] / stress[np.argmax(np.abs(stress))]
-    if load.min() < -ALREADY_LOADED:
+    if load.min() < -ALREADY_LOADED or np.abs(load[:FEWEST_SLACK]).max() > MOST_LOAD:
         return None
     _, (share, mean_load) = averaged(MOST_POINTS, way / way[-1], load)
     last = float(stretch[order[-1]])
