@@ -21,6 +21,7 @@ from tissuq.experiments.experiment import Experiment as Experiment
 from tissuq.experiments.reading.inspection import Inspection as Inspection, inspect as inspect
 from tissuq.experiments.modes.mode import LoadingMode as LoadingMode, loading_modes as loading_modes
 from tissuq.experiments.reading.read import read as read, read_experiment as read_experiment
+from tissuq.experiments.reading.table_of_specimens import read_sizes as read_sizes
 from tissuq.experiments.reading.tests_in_file import read_tests as read_tests
 from tissuq.mechanics import (
     engineering_stress as engineering_stress,

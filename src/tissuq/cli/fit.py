@@ -16,8 +16,8 @@ from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.files_of_tests import files_of, measured, run_name
 from tissuq.studies.fit_settings import ALL, LawSettings, PopulationSettings, SpecimenSettings
-from tissuq.studies.measured_file import ReadingSettings
-from tissuq.studies.option import option
+from tissuq.studies.measured_file import READING, ReadingSettings
+from tissuq.studies.option import option, table_of_sizes
 from tissuq.studies.settings import setting_of
 
 if TYPE_CHECKING:
@@ -31,8 +31,9 @@ class FitOptions(Written):
     """How files are taken, among how many processes several laws are divided, and how the run is written."""
 
     specimen: tuple[str, ...] = option(
-        (), "Name of the specimen, once for each of several files [each its own].", group="Reading files"
+        (), "Name of the specimen, once for each of several files [each its own].", group=READING
     )
+    sizes: Path | None = table_of_sizes(READING)
     workers: int | None = option(
         None, "Processes that several laws are divided among [one a core from four laws].", ge=1
     )
@@ -48,14 +49,15 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     paths: list[Path] = call.stated.pop("file", [])
     if call.config is None and [path.suffix for path in paths] == [".toml"]:
         call, paths = replace(call, how=call.how.model_copy(update={"config": paths[0]})), []
-    files = files_of(paths)
+    files = files_of(paths, call.how.sizes)
     read_as = {name: call.stated.pop(name) for name in ReadingSettings.model_fields if name in call.stated}
     modes, noise = read_as.pop("mode", None), call.stated.pop("noise_sd", None)
     axial_stretches: list[float] | None = read_as.pop("axial_stretch", None)
     if call.config:
-        _check_once(call.how.specimen, modes, noise, axial_stretches)
+        _check_once(call.how, modes, noise, axial_stretches)
         read_as |= {"mode": modes[0]} if modes else {}
         read_as |= {"axial_stretch": axial_stretches[0]} if axial_stretches else {}
+    read_as |= {"sizes": call.how.sizes} if call.how.sizes else {}
     of_files = [] if call.config else files
     of_tests, read_tests = measured(of_files, read_as, modes, call.how.specimen, noise, axial_stretches, print)
     if not (paths or call.config):
@@ -118,14 +120,18 @@ def _fitted(
 
 
 def _check_once(
-    specimens: Sequence[str],
+    how: FitOptions,
     modes: Sequence[str] | None,
     noise: Sequence[float | str] | None,
     axial_stretches: Sequence[float] | None,
 ) -> None:
     """Refuse what is given for each of several files, which a configuration says of its tests."""
-    if specimens:
+    if how.specimen:
         raise InputError("--specimen names the specimens of FILES; in a configuration, 'specimen' of a test does.")
+    if how.sizes:
+        raise InputError(
+            "--sizes holds the sizes of the specimens of FILES; a configuration has 'dimensions' of a test."
+        )
     for typed, values in (("--mode", modes), ("--noise-sd", noise), ("--axial-stretch", axial_stretches)):
         if values and len(values) > 1:
             raise InputError(f"{typed} is given {len(values)} times beside --config; give it once.")

@@ -12,8 +12,8 @@ from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.numbers import wrapped
 from tissuq.studies.answers import DIMENSIONS, Answer, answers_in, options_in, with_options
 from tissuq.studies.files_of_tests import files_of, find_tests, tables_of, tests_in_words
-from tissuq.studies.measured_file import ReadingSettings
-from tissuq.studies.option import argument, option
+from tissuq.studies.measured_file import READING, ReadingSettings
+from tissuq.studies.option import argument, option, table_of_sizes
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -37,6 +37,7 @@ class InspectedFiles(ReadingSettings):
         "CSV, Excel or other files, folders of them, FILE#NAME for one test in a file, data sets.",
         takes=list[Path],
     )
+    sizes: Path | None = table_of_sizes(READING)
 
 
 class InspectOptions(IntoFolder):
@@ -61,7 +62,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     if write is not None and write.exists() and not force:
         raise InputError(f"'{write}' exists. Give another name, or --force to replace it.")
     settings: dict[str, Any] = dict(call.stated)
-    files = files_of(settings.pop("file"))
+    files = files_of(settings.pop("file"), settings.get("sizes"))
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path in files:
         if ask:

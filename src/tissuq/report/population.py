@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new specimen, from which other commands start."""
-COVARIATES = "covariates-of-specimens"
-"""The name of the table of covariates in a run's folder."""
+COVARIATES, SIZES = "covariates-of-specimens", "sizes-of-specimens"
+"""The names of the tables of covariates and of sizes in a run's folder."""
 NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of specimens."
 SPECIMENS = (
     "Every specimen by itself (grey) and within the population (blue): 95 % interval and median (tick). Bands: 95 % "
@@ -235,9 +235,10 @@ def _copies(study: PopulationStudy, beside: Path) -> tuple[Copies, dict[str, Any
             copies.of_file(file, f"{INPUT}/{name}" if is_folder else INPUT)
     sources = INPUT if settings.specimen is None else f"{INPUT}/{Path(settings.files[0]).name}"
     relocated: dict[str, Any] = {"files": (sources,), "material": copies.of_law(settings.material)}
-    if settings.covariates is not None:
-        table = beside / settings.covariates
-        relocated["covariates"] = copies.of_file(table, name=f"{COVARIATES}{table.suffix}")
+    tables = {"covariates": (settings.covariates, COVARIATES), "sizes": (settings.sizes, SIZES)}
+    for setting, (table, name) in tables.items():
+        if table is not None:
+            relocated[setting] = copies.of_file(beside / table, name=f"{name}{Path(table).suffix}")
     return copies, relocated
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -51,9 +51,10 @@ def resolve(file: Path) -> Path:
     return datasets.path(str(file))
 
 
-def files_of(paths: Sequence[Path]) -> list[Path]:
-    """Return the files that were given; of a folder those in it that may hold measurements."""
-    from tissuq.experiments.reading.specimens_in_files import SUFFIXES, tables_in
+def files_of(paths: Sequence[Path], sizes: Path | None = None) -> list[Path]:
+    """Return the files that were given; of a folder those that may hold measurements, but for a table of sizes."""
+    from tissuq.experiments.reading.file_format import SUFFIXES
+    from tissuq.experiments.reading.specimens_in_files import tables_in
 
     files: list[Path] = []
     for path in paths:
@@ -62,7 +63,7 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
         if not path.is_dir():
             files.append(resolve(path))
             continue
-        inside = tables_in(path)
+        inside = [file for file in tables_in(path) if sizes is None or file.resolve() != sizes.resolve()]
         if not inside:
             raise InputError(f"folder '{path}' has no files of measurements ({', '.join(SUFFIXES)}).")
         files += inside
@@ -109,7 +110,8 @@ def measured(
         if specimens:
             raise InputError(f"--specimen {specimens[0]}: it tells tests of one specimen from others, and '{files[0]}' "
                              "is of one test; leave it out.")  # fmt: skip
-        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(readings)
+        of_all = {name: value for name, value in reading.items() if name != "sizes"}
+        return of_all | tests[0] | {"noise_sd": noise[0] if noise else None}, list(readings)
     if len(tests) > len(files):
         say("\n".join([*lines_of_tests(list(map(Inspection, readings))), ""]))
     if len(files) == 1:
@@ -134,10 +136,12 @@ def measured(
 def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options that read one of several files: without columns that others have, and it has not.
 
+    Of a table of ``sizes`` among the options they are those of its specimen, where none are given.
+
     Raises
     ------
     InputError
-        When it has several columns that are given for one role.
+        When it has several columns that are given for one role, or no row in the table of sizes.
     """
     from tissuq.experiments.reading.recognition import find_column
 
@@ -162,7 +166,31 @@ def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) ->
             columns[role] = here[0]
         elif any(has(other, role, name) for other in files for name in names):
             del columns[role]
-    return {**reading, "columns": columns or None}
+    others = {name: value for name, value in reading.items() if name != "sizes"}
+    dimensions = {**dimensions_in(reading.get("sizes"), names_of(file), str(file)), **(reading.get("dimensions") or {})}
+    return {**others, "columns": columns or None, "dimensions": dimensions or None}
+
+
+def names_of(file: Path) -> list[str]:
+    """Return how a table of specimens may call that of a file, or of the test FILE#NAME: as these, or as its folder."""
+    name, _, test = (str(file), "", "") if file.exists() else str(file).partition("#")
+    path = Path(name)
+    return [name for name in (test, path.name, path.stem, path.resolve().parent.name) if name]
+
+
+def dimensions_in(sizes: Path | str | None, names: Collection[str], file: str) -> Mapping[str, str]:
+    """Return the dimensions of the specimen with one of some names in a table of sizes; none without a table.
+
+    Raises
+    ------
+    InputError
+        When the table cannot be read, or has no row for it.
+    """
+    if sizes is None:
+        return {}
+    from tissuq.experiments.reading.table_of_specimens import dimensions_from, read_sizes
+
+    return dimensions_from(read_sizes(sizes), names, str(sizes), file)
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

@@ -21,13 +21,14 @@ from tissuq.studies.measured_file import (
     MeasuredTest,
     ReadingSettings,
 )
-from tissuq.studies.option import argument, option
+from tissuq.studies.option import argument, option, table_of_sizes
 from tissuq.studies.option_texts import aimed_share, noises, pairs_of, priors
 from tissuq.studies.settings import looked_up
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
     from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.reading.options import ReadingOptions
     from tissuq.experiments.reading.specimens_in_files import CovariateTable
     from tissuq.experiments.units import StressUnit
     from tissuq.mechanics import Material
@@ -217,6 +218,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         min_length=1,
     )
     specimen: str | None = option(None, "Column of a single file that names the specimens.", name="specimen-column")
+    sizes: str | None = table_of_sizes(READING, takes=Path)
     parameters: tuple[str, ...] | None = option(
         None, "Parameter to pool; repeat for more [all of the material].", name="parameter"
     )
@@ -264,7 +266,8 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         from tissuq.experiments.reading.specimens_in_files import find_tests
 
         if self.specimen is None:
-            return find_tests([folder / file for file in self.files], but=self.covariates and folder / self.covariates)
+            tables = [folder / table for table in (self.covariates, self.sizes) if table is not None]
+            return find_tests([folder / file for file in self.files], but=tables)
         if len(self.files) > 1 or (folder / self.files[0]).is_dir():
             raise InputError(
                 "--specimen-column names a column of a single file: give one FILE, or leave --specimen-column out."
@@ -300,15 +303,25 @@ class PopulationSettings(FittedSettings, ReadingSettings):
     def _all_readings(self, folder: Path) -> dict[str, list[Reading]]:
         from tissuq.experiments.reading.specimens_in_files import of_specimen, read_column
         from tissuq.experiments.reading.tests_in_file import TestInFile, find_tests_in_file
+        from tissuq.studies.files_of_tests import dimensions_in, names_of
 
-        sources = self.sources(folder)
+        sources, sizes = self.sources(folder), self.sizes and folder / self.sizes
+        options = self.reading_options
         if self.specimen is not None:
             (file,) = next(iter(sources.values()))
-            return read_column(file, self.specimen, **self.reading_options)
-        options, tests_of = self.reading_options, dict[str, list[TestInFile]]()
+
+            def dimensions_of(names: Collection[str]) -> Mapping[str, str]:
+                return dimensions_in(sizes, names, ", ".join(names))
+
+            return read_column(file, self.specimen, dimensions_of, **options)
+        tests_of = dict[str, list[TestInFile]]()
         for name, files in sources.items():
-            in_files = (find_tests_in_file(file, is_one_of_several=len(files) > 1, **options) for file in files)
-            tests_of[name] = [*chain.from_iterable(in_files)]
+            for file in files:
+                dimensions = {**dimensions_in(sizes, [*names_of(file), name], str(file)), **self.dimensions}
+                of_file: ReadingOptions = {**options, "dimensions": dimensions}
+                tests_of.setdefault(name, []).extend(
+                    find_tests_in_file(file, is_one_of_several=len(files) > 1, **of_file)
+                )
         single_files = [tests for name, tests in tests_of.items() if len(sources[name]) == 1]
         stated = ({test.reading.experiment.specimen for test in tests} - {""} for tests in single_files)
         files_of = Counter(chain.from_iterable(stated))

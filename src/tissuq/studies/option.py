@@ -158,6 +158,17 @@ def only_rows(group: str = "") -> Any:
     )
 
 
+def table_of_sizes(group: str = "", takes: Any = None) -> Any:
+    """Declare the table of a laboratory book with the sizes of specimens."""
+    return option(
+        None,
+        "Table of the undeformed sizes of specimens: in its first column their names, or those of their files, then "
+        "'length [mm]', 'width [mm]' and the like.",
+        group=group,
+        takes=takes,
+    )
+
+
 def sampling() -> Any:
     """Declare how draws spread through a posterior."""
     return option(

@@ -25,6 +25,10 @@ SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("
 BREADTHS = ("diameter",), ("width", "thickness")
 """Sizes that say how broad a specimen is; an area alone tells it of a round one."""
 EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
+NOT_IN_FILE = (
+    "None is recognised in the file. A table of those of many specimens does, too (the option sizes of commands, or "
+    "tissuq.read_sizes)."
+)
 PLURALS = {"thickness": "thicknesses"}
 """Of names of sizes that do not end in s alone."""
 
@@ -236,7 +240,7 @@ class Dimensions:
         areas = self._others(AREA, "area", default="")
         return areas or self._others(LENGTH, "width", "thickness", "diameter")
 
-    def _others(self, kind: Quantity, *names: str, default: str = "None is recognised in the file.") -> str:
+    def _others(self, kind: Quantity, *names: str, default: str = NOT_IN_FILE) -> str:
         """Return what other sizes the file states, and the options that say what they are."""
         sizes = [size for size in self.further_sizes if size.kind is kind][:SHOWN]
         if not sizes and "length" in names and {"diameter", "thickness"} <= self.sizes.keys():

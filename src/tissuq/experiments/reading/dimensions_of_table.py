@@ -67,7 +67,7 @@ def dimensions_of(
     for name in DIMENSION_NAMES:
         of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
         unnamed = [size for size in unnamed if size not in of_name]
-        sizes = [Dimension(*statement) for statement in _statements_of_size(of_name)]
+        sizes = [Dimension(*statement) for statement in statements_of_size(of_name)]
         means = [size for size in sizes if size.source.startswith(MEAN_OF) and name not in texts]
         averages += [f"the {name} is the {mean.source}: {mean.value:.4g} {quantity_of(name).unit}." for mean in means]
         if name not in texts and any(not agree(size, sizes[0]) for size in sizes):
@@ -185,7 +185,7 @@ def given_size(name: str, text: str) -> Dimension:
     return Dimension(quantity_of(name).value(text), "as given")
 
 
-def _statements_of_size(sizes: Sequence[StatedSize]) -> list[tuple[float, str]]:
+def statements_of_size(sizes: Sequence[StatedSize]) -> list[tuple[float, str]]:
     """Return the values of one size and where they stand; measurements that differ little as their mean."""
     by_number = {(size.measurement, size.value): size for size in sizes if size.measurement}
     values = [value for _, value in by_number]

@@ -18,6 +18,8 @@ LONGEST_SIGNATURE = 64
 """First bytes of a file that are looked at."""
 SEPARATOR_OF_CELLS = "\t"
 """What stands between the cells of a line of a sheet."""
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet", ".json")
+"""Of files in a folder that may hold measurements."""
 
 
 class FileFormat(ABC):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,26 +13,23 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format
-from tissuq.experiments.reading.layout import WHITESPACE, is_comment, split
+from tissuq.experiments.reading.file_format import SUFFIXES
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import only_rows, row_names
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.table_of_specimens import table_of_specimens
 from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
-from tissuq.experiments.reading.text_file import read_lines
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet", ".json")
-"""Of files in a folder that may hold measurements."""
 BESIDE_TABLES = ("~$", "._", ".~")
 """How names of files begin that are there while a workbook is open, or that macOS leaves on other disks."""
 
 
 def find_tests(
-    paths: Sequence[str | os.PathLike[str]], but: str | os.PathLike[str] | None = None
+    paths: Sequence[str | os.PathLike[str]], but: Collection[str | os.PathLike[str]] = ()
 ) -> dict[str, list[Path]]:
-    """Return the files of every specimen, but for a file that is none.
+    """Return the files of every specimen, but for files that are none.
 
     A file is a specimen of its name. In a folder, every file is, and every folder is one specimen with a file for each
     test.
@@ -43,10 +40,10 @@ def find_tests(
         When there is no file in a folder, or two specimens have one name.
     """
     specimens: dict[str, list[Path]] = {}
-    left_out = None if but is None else Path(but).resolve()
+    left_out = {Path(file).resolve() for file in but}
     for path in map(Path, paths):
         for source, files in (_in_folder(path) if path.is_dir() else {path: [path]}).items():
-            if source.resolve() == left_out:
+            if source.resolve() in left_out:
                 continue
             name = source.name if source.is_dir() else source.stem
             if name in specimens:
@@ -59,7 +56,10 @@ def find_tests(
 
 
 def read_column(
-    path: str | os.PathLike[str], specimen: str | int, **options: Unpack[ReadingOptions]
+    path: str | os.PathLike[str],
+    specimen: str | int,
+    dimensions_of: Callable[[Collection[str]], Mapping[str, str]] = lambda names: {},
+    **options: Unpack[ReadingOptions],
 ) -> dict[str, list[Reading]]:
     """Return what is read of the tests of each specimen that a column of one file names, in the order of the file.
 
@@ -68,6 +68,8 @@ def read_column(
     path : str or path
     specimen : str or int
         Name, or number from 1, of the column.
+    dimensions_of : callable
+        Returns the dimensions of the specimen that has one of some names, where they are not in ``options``.
     options
         As for `tissuq.read_experiment`.
     """
@@ -80,7 +82,11 @@ def read_column(
         raise InputError(f"{table.place(column, row)}: the name of the specimen is missing.")
     readings = {}
     for label in dict.fromkeys(labels.tolist()):
-        of_label: ReadingOptions = {**options, "only": {**only, table.key(column): label}}
+        of_label: ReadingOptions = {
+            **options,
+            "only": {**only, table.key(column): label},
+            "dimensions": {**dimensions_of([label]), **(options.get("dimensions") or {})},
+        }
         tests = find_tests_in_file(path, is_one_of_several=True, **of_label)
         readings[label] = [of_specimen(test.reading, label) for test in tests]
     return readings
@@ -179,32 +185,5 @@ def read_covariates(path: str | os.PathLike[str], specimens: Collection[str]) ->
     InputError
         When there is no such table in the file.
     """
-    workbook = file_format(path)
-    lines = next(iter(workbook.lines_by_sheet(os.fspath(path)).values()), []) if workbook else read_lines(path)
-    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
-    if len(numbered) < 2:
-        raise InputError(
-            f"{path} holds no covariates. Write the names of the columns into the first line, such as "
-            "'specimen,age,sex', and a line for each specimen."
-        )
-    header = numbered[0][1]
-    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in "\t;," if mark in header), WHITESPACE)
-    names = split(header, separator)
-    rows = [line for _, line in numbered[1:]]
-    table = Table(str(path), tuple(names), ("",) * len(names), separator, rows, [n for n, _ in numbered[1:]])
-    for row, line in enumerate(rows):
-        if len(split(line, separator)) > len(names):
-            raise InputError(
-                f"{path}, line {table.lines[row]}: more cells than the {len(names)} columns that line {numbered[0][0]} "
-                "names. Write numbers with a decimal point, or quote a text that holds the separator."
-            )
-    if "" in names or len(set(names)) < len(names):
-        raise InputError(f"{path}, line {numbered[0][0]}: every column needs a name of its own; they are: {header!r}.")
-    labels = [
-        Path(cell).stem if cell not in specimens and cell.lower().endswith(SUFFIXES) else cell
-        for cell in table.texts(0)
-    ]
-    if twice := [name for name in dict.fromkeys(labels) if labels.count(name) > 1]:
-        row = len(labels) - 1 - labels[::-1].index(twice[0])
-        raise InputError(f"{table.place(0, row)}: specimen '{twice[0]}' has several rows; give one for each specimen.")
-    return CovariateTable(table, labels, 0, {name: column for column, name in enumerate(names) if column})
+    table, labels = table_of_specimens(path, specimens, "covariates", "specimen,age,sex")
+    return CovariateTable(table, labels, 0, {name: column for column, name in enumerate(table.names) if column})

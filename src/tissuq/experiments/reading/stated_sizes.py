@@ -191,17 +191,19 @@ def _of_several(
 ) -> Iterator[StatedSize]:
     """Yield the value of a test of several that a line states, or all: of one specimen they are its measurements."""
     if test and (text := _over(values, test)) is not None:
-        yield from _sizes(heading(name), text, f"{source}, over its columns", f"{name}: {text}")
+        yield from sizes_of_text(heading(name), text, f"{source}, over its columns", f"{name}: {text}")
         return
     for number, (text, _) in enumerate(values, 1):
-        yield from _sizes(heading(name), text, source, f"{name}: {text}", str(number) if are_measured_again else "")
+        yield from sizes_of_text(
+            heading(name), text, source, f"{name}: {text}", str(number) if are_measured_again else ""
+        )
 
 
 def _of_words(name: str, number: str, unit: str, source: str, measurement: str) -> list[StatedSize]:
     """Return the sizes that a name, and what follows it, state; the unit is with one of them, or beside the number."""
     for text in (f"{number} {unit}", number, f"{unit} {number}"):
         value = DEVIATION.sub("", text)
-        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}", measurement):
+        if sizes := sizes_of_text(heading(name), value, source, f"{name}: {text.strip()}", measurement):
             return sizes
     return []
 
@@ -210,7 +212,7 @@ def _among_words(text: str, source: str) -> Iterator[StatedSize]:
     """Yield a length or an area among other words, which is a size without a name."""
     for match in filter(None, (pattern.search(text) for pattern in UNCLEAR)):
         shown = " ".join(text.split())[:LONGEST_QUOTE]
-        if sizes := _sizes(Heading("", match["unit"]), match["number"], source, shown):
+        if sizes := sizes_of_text(Heading("", match["unit"]), match["number"], source, shown):
             yield from sizes
             return
 
@@ -226,7 +228,7 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
             continue
         value, source = next(iter(cells)), f"in column {table.label(column)}"
         for unit in table.stated_units(column):
-            yield from _sizes(Heading(quantity, unit), value, source, f"{name}: {value}", measurement)
+            yield from sizes_of_text(Heading(quantity, unit), value, source, f"{name}: {value}", measurement)
 
 
 def _is_size(name: Heading) -> bool:
@@ -279,10 +281,10 @@ def _of_specimens(
                     source = f"{stated_in} ({name.unit} {UNIT_ASSUMED}"
                 quantity, measurement = numbered(name.quantity)
                 shown = f"{name.quantity}: {cells[column]}"
-                yield from _sizes(Heading(quantity, name.unit), cells[column], source, shown, measurement)
+                yield from sizes_of_text(Heading(quantity, name.unit), cells[column], source, shown, measurement)
 
 
-def _sizes(name: Heading, text: str, source: str, shown: str, measurement: str = "") -> list[StatedSize]:
+def sizes_of_text(name: Heading, text: str, source: str, shown: str, measurement: str = "") -> list[StatedSize]:
     """Return the length or the area that a text states, in the unit there or beside the name; nothing for others.
 
     Of a product such as ``5 x 2 mm`` they are the sizes that the name has for its factors, or else the area of two.

@@ -1,0 +1,172 @@
+"""Tables with a row for each specimen, whose names stand in the first column: their sizes, and other things known."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.dimensions import Dimension, agree, quantity_of, sections_of
+from tissuq.experiments.reading.dimensions_of_table import statements_of_size
+from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, SUFFIXES, file_format
+from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, plain
+from tissuq.experiments.reading.layout import MISSING, WHITESPACE, is_comment, is_units_row, split
+from tissuq.experiments.reading.stated_sizes import StatedSize, numbered, sizes_of_text
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.text_file import read_lines
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
+
+EXAMPLE_OF_SIZES = "specimen,length [mm],width [mm],thickness [mm]"
+"""A first line of a table of sizes."""
+
+
+def table_of_specimens(
+    path: str | os.PathLike[str], specimens: Collection[str], what: str, example: str
+) -> tuple[Table, list[str]]:
+    """Return a table whose first line names its columns, and the specimen of every row, which it may call by a file.
+
+    Parameters
+    ----------
+    path : str or path
+    specimens : collection of str
+        Names that stay as they are, even where they end as those of files.
+    what, example : str
+        What it holds, and a first line, for messages.
+
+    Raises
+    ------
+    InputError
+        When there is no such table in the file.
+    """
+    workbook = file_format(path)
+    lines = next(iter(workbook.lines_by_sheet(os.fspath(path)).values()), []) if workbook else read_lines(path)
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
+    if len(numbered) < 2:
+        raise InputError(
+            f"{path} holds no {what}. Write the names of the columns into the first line, such as '{example}', and a "
+            "line for each specimen."
+        )
+    header = numbered[0][1]
+    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in "\t;," if mark in header), WHITESPACE)
+    names = split(header, separator)
+    rows = [line for _, line in numbered[1:]]
+    table = Table(str(path), tuple(names), ("",) * len(names), separator, rows, [n for n, _ in numbered[1:]])
+    for row, line in enumerate(rows):
+        if len(split(line, separator)) > len(names):
+            raise InputError(
+                f"{path}, line {table.lines[row]}: more cells than the {len(names)} columns that line {numbered[0][0]} "
+                "names. Write numbers with a decimal point, or quote a text that holds the separator."
+            )
+    if "" in names or len(set(names)) < len(names):
+        raise InputError(f"{path}, line {numbered[0][0]}: every column needs a name of its own; they are: {header!r}.")
+    labels = [
+        Path(cell).stem if cell not in specimens and cell.lower().endswith(SUFFIXES) else cell
+        for cell in table.texts(0)
+    ]
+    if twice := [name for name in dict.fromkeys(labels) if labels.count(name) > 1]:
+        row = len(labels) - 1 - labels[::-1].index(twice[0])
+        raise InputError(f"{table.place(0, row)}: specimen '{twice[0]}' has several rows; give one for each specimen.")
+    return table, labels
+
+
+def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
+    r"""Read the sizes of specimens from a table of a laboratory book, with a row for each of them.
+
+    Parameters
+    ----------
+    path : str or path
+        A text or a workbook. Its first line names the columns; the first column names the specimens, or their files.
+        Columns of lengths, widths, thicknesses, diameters and areas have their units in the names, such as
+        ``width [mm]``, or in a row beneath them; of numbered ones (``Thickness 1 (mm)``) it is the mean. Others are not
+        looked at.
+
+    Returns
+    -------
+    dict of str to dict of str to str
+        By the name of the specimen what `tissuq.read` takes as ``dimensions``.
+
+    Raises
+    ------
+    InputError
+        When there is no such table in the file, a size is no number with a unit, or an area is not that of the sides.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import tissuq as tq
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = Path(folder, "sizes.csv")
+    ...     _ = table.write_text("specimen,length [mm],width [mm],thickness [mm]\nA.csv,20,10.2,3.1\n")
+    ...     tq.read_sizes(table)
+    {'A': {'width': '10.2 mm', 'thickness': '3.1 mm', 'length': '20.0 mm'}}
+    """
+    table, labels = table_of_specimens(path, (), "sizes", EXAMPLE_OF_SIZES)
+    headings = {column: heading(name) for column, name in enumerate(table.names) if column}
+    units = table.cells()[0]
+    first = 1 if is_units_row(units[1:]) else 0
+    if first:
+        headings = {column: Heading(name.quantity, units[column].strip("[]()")) for column, name in headings.items()}
+    of_sizes = {
+        column: name
+        for column, name in headings.items()
+        if dimensions_named(numbered(name.quantity)[0], is_cylinder=True)
+    }
+    if not of_sizes:
+        raise InputError(
+            f"{path}: none of the columns {', '.join(map(repr, table.names))} is known as a size of specimens. Name "
+            f"them as in '{EXAMPLE_OF_SIZES}'."
+        )
+    return {label: _sizes_of_row(table, row, of_sizes) for row, label in enumerate(labels) if row >= first}
+
+
+def dimensions_from(
+    sizes: Mapping[str, Mapping[str, str]], names: Collection[str], table: str, file: str
+) -> Mapping[str, str]:
+    """Return the sizes of the specimen that has one of some names, in their order; capitals and blanks are the same.
+
+    Raises
+    ------
+    InputError
+        When none of the rows is of it.
+    """
+    by_name = {plain(name): dimensions for name, dimensions in sizes.items()}
+    for name in names:
+        if (dimensions := sizes.get(name, by_name.get(plain(name)))) is not None:
+            return dimensions
+    raise InputError(
+        f"{table} has no row for {file}: its rows are of {', '.join(sizes)}. Name the file, or its specimen, in the "
+        "first column."
+    )
+
+
+def _sizes_of_row(table: Table, row: int, headings: Mapping[int, Heading]) -> dict[str, str]:
+    """Return the sizes in a row as texts, the cross-section in one way; a height is a length where none is named so."""
+    cells, stated = table.cells()[row], list[StatedSize]()
+    for column, named in headings.items():
+        if cells[column].lower() in MISSING:
+            continue
+        quantity, measurement = numbered(named.quantity)
+        of_cell = sizes_of_text(Heading(quantity, named.unit), cells[column], "", "", measurement)
+        if not of_cell:
+            raise InputError(
+                f"{table.place(column, row)}: '{cells[column]}' is no size with a unit. Write a number above zero, and "
+                "the unit into the name of the column, such as 'width [mm]'."
+            )
+        stated += of_cell
+    sizes = dict[str, Dimension]()
+    is_cylinder = not any(size.is_of("length", is_cylinder=False) for size in stated)
+    for name in DIMENSION_NAMES:
+        values = statements_of_size([size for size in stated if size.is_of(name, is_cylinder=is_cylinder)])
+        if len(values) > 1:
+            listed = " and ".join(f"{value:g} {quantity_of(name).unit}" for value, _ in values)
+            raise InputError(f"{table.place(0, row)}: the {name} is {listed}; leave one of them.")
+        if values:
+            sizes[name] = Dimension(*values[0])
+    sections = list(sections_of(sizes).values())
+    if any(not agree(section, sections[0]) for section in sections):
+        listed = " and ".join(f"{section.value:.4g} mm2" for section in sections)
+        raise InputError(f"{table.place(0, row)}: the cross-section is {listed}; leave one of them.")
+    unneeded = {"width", "diameter"} if "area" in sizes else set()
+    return {name: f"{size.value!r} {quantity_of(name).unit}" for name, size in sizes.items() if name not in unneeded}
