@@ -127,6 +127,24 @@ def test_fits_of_other_data_and_single_fits_are_refused(fits):
 
 
 @pytest.mark.parametrize(
+    ("group", "variable"),
+    [("observed_data", "stress"), ("constant_data", "stretch"), ("leave_one_out", "log_density")],
+)
+def test_a_tree_that_lacks_what_is_compared_is_refused(fits, group, variable):
+    changed = fits["yeoh"].data.copy()
+    changed[group] = xr.DataTree(changed[group].to_dataset().drop_vars(variable))
+    with pytest.raises(tq.InputError, match="'changed' is no fit of measured stresses"):
+        tq.compare({"none": fits["none"], "changed": changed})
+
+
+def test_an_evidence_that_is_no_number_is_refused(fits):
+    changed = fits["yeoh"].data.copy()
+    changed.attrs["log_evidence"] = "high"
+    with pytest.raises(tq.InputError, match="the attribute 'log_evidence' of 'changed' is no number, but 'high'"):
+        tq.compare({"none": fits["none"], "changed": changed})
+
+
+@pytest.mark.parametrize(
     ("evidences", "named"),
     [
         ({"a": (-3.0, 0.2), "b": (-3.25, 0.1), "c": (-9.0, 0.1)}, "whether a or b has"),

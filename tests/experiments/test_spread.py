@@ -41,6 +41,11 @@ def test_the_spread_of_a_mean_becomes_its_standard_error(tmp_path, names, option
     np.testing.assert_allclose(data.standard_error, error, rtol=1e-9)
 
 
+def test_one_standard_error_for_all_rows_is_read(tmp_path):
+    data = read_experiment(by_name(tmp_path, Stretch=STRETCH, **{"Stress (kPa)": STRESS, "SEM": np.full(7, 0.5)}))
+    np.testing.assert_allclose(data.standard_error, 0.5e-3, rtol=1e-9)
+
+
 def test_the_number_of_specimens_may_stand_in_a_column(tmp_path):
     counts = np.array([6, 6, 6, 6, 5, 5, 4])
     file = by_name(tmp_path, Stretch=STRETCH, **{"Stress (kPa)": STRESS, "SD (kPa)": SPREAD}, n=counts)

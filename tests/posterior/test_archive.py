@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -190,6 +191,31 @@ def test_a_law_that_was_changed_since_the_fit_is_refused(tmp_path):
         with pytest.raises(tq.InputError, match="'own_law' has other stresses than when this posterior was fitted"):
             tq.load(tmp_path / "p.nc", material=changed)
     tq.load(tmp_path / "p.nc", material=written(1.0))
+
+
+@pytest.mark.parametrize("name", ["fit/mixture/root", "fit/mixture/settings", "fit/model/curve", "fit/tests/1"])
+@pytest.mark.parametrize("change", ["deleted", "renamed", "emptied"])
+def test_a_file_of_which_something_was_changed_is_refused(tmp_path, name, change):
+    """Without its roots it had been loaded as a posterior that is certain, without settings it ended in a traceback."""
+    path = tmp_path / "p.nc"
+    tq.fit(two_specimens(), discrepancy="mooney-rivlin", noise_sd=0.02).save(path)
+    with h5py.File(path, "r+") as file:
+        if change == "renamed":
+            file.move(name, f"{name}_of_earlier")
+        else:
+            del file[name]
+        if change == "emptied":
+            file[name] = np.zeros((0, 1))
+    with pytest.raises(tq.InputError, match="was changed since it was written"):
+        tq.load(path)
+
+
+def test_a_file_that_xarray_wrote_again_as_it_was_is_loaded(tmp_path):
+    posterior = tq.fit(measured(), discrepancy="taylor", noise_sd=0.02)
+    posterior.save(tmp_path / "p.nc")
+    with xr.open_datatree(tmp_path / "p.nc", engine="h5netcdf") as tree:
+        tree.to_netcdf(tmp_path / "again.nc", engine="h5netcdf")
+    same(posterior.summary(), tq.load(tmp_path / "again.nc").summary())
 
 
 def test_a_damaged_or_foreign_file_is_said(tmp_path):

@@ -191,6 +191,8 @@ def _check_average(fits: Mapping[str, Any]) -> None:
 
 
 INITIAL_SHEAR_MODULUS = "initial shear modulus"
+COMPARED = {"observed_data": {"stress"}, "constant_data": {"stretch"}, "leave_one_out": {"log_density", "is_rough"}}
+"""What is compared of trees: arrays by group."""
 EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
 
@@ -288,7 +290,11 @@ def _tree(fit: Any) -> xr.DataTree:
 
 def _numbers(trees: Mapping[str, xr.DataTree], name: str) -> FloatArray:
     """Return a number that the fits' attributes give; nan where they do not."""
-    return np.array([float(tree.attrs.get(name, np.nan)) for tree in trees.values()])
+    found = {fit: tree.attrs.get(name, np.nan) for fit, tree in trees.items()}
+    for fit, number in found.items():
+        if isinstance(number, str):
+            raise InputError(f"the attribute '{name}' of '{fit}' is no number, but '{number}': run the fit again.")
+    return np.array([float(number) for number in found.values()])
 
 
 def _parameter(trees: Mapping[str, xr.DataTree]) -> dict[str, Any]:
@@ -330,7 +336,8 @@ def _check_comparable(trees: Mapping[str, Any]) -> None:
         raise InputError("give two fits or more to compare.")
     names = list(trees)
     for name, tree in trees.items():
-        if not {"observed_data", "constant_data", "leave_one_out"} <= set(tree.children):
+        has_all = all(group in tree.children and held <= set(tree[group].variables) for group, held in COMPARED.items())
+        if not has_all or tree["leave_one_out"]["log_density"].size != tree["observed_data"]["stress"].size:
             raise InputError(
                 f"'{name}' is no fit of measured stresses, of which each was left out in turn: compare runs of tissuq "
                 "fit of the same measurements."

@@ -25,7 +25,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import Statistics
 from tissuq.model.tolerances import FittedErrors, Tolerances
 from tissuq.parameters.priors import prior_from
-from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
+from tissuq.posterior.netcdf import Group, LabelledGroup, digest, opened, read_groups
 from tissuq.posterior.solver import Solver
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -214,6 +214,8 @@ def _named(kind: str, name: str, find: Callable[[str], T] | None, supplied: T | 
 
 FORMAT = 2
 """Version of the groups; of another one nothing is known."""
+DIGEST = "digest"
+"""Attribute by which it is seen that the groups are as they were written; older files have none."""
 FIT, SOLUTION, MIXTURE, WIDE_MIXTURE, MARGINALS = "fit", "solution", "mixture", "wide_mixture", "marginals"
 STABILITY = ("stable_in", "stable_share", "stable_prior_share")
 PLAIN = ("route", "reason", "seed", "log_evidence", "log_evidence_error", "is_of_data", *STABILITY)
@@ -242,7 +244,8 @@ def solution_groups(solution: Solution, solver: Solver) -> dict[str, LabelledGro
     if solution.has_wide_mixture:
         groups[WIDE_MIXTURE] = LabelledGroup(solution.wide_mixture.to_arrays())
     recorded = groups | _model_groups(solution.model)
-    return {FIT: LabelledGroup(attrs={"format": FORMAT})} | {f"{FIT}/{name}": group for name, group in recorded.items()}
+    sealed = {"format": FORMAT, DIGEST: digest({name: group.as_read for name, group in recorded.items()})}
+    return {FIT: LabelledGroup(attrs=sealed)} | {f"{FIT}/{name}": group for name, group in recorded.items()}
 
 
 def read_solution(
@@ -271,6 +274,9 @@ def read_solution(
             )
         if groups[FIT].attrs["format"] != FORMAT:
             raise InputError(f"'{path}' is of another version of tissuq: run the fit again.")
+        recorded = {name: group for name, group in groups.items() if name != FIT}
+        if DIGEST in groups[FIT].attrs and digest(recorded) != groups[FIT].attrs[DIGEST]:
+            raise InputError(f"'{path}' was changed since it was written, in its group '{FIT}': run the fit again.")
         return _solution(groups, _recorded_model(groups, material, discrepancy)), _solver(groups)
     except TissuqError:
         raise

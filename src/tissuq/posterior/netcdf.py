@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -49,6 +50,11 @@ class LabelledGroup:
     arrays: dict[str, Any] = field(default_factory=dict)
     coordinates: dict[str, Any] = field(default_factory=dict)
     attrs: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def as_read(self) -> Group:
+        """What `read_groups` gives of it once it is written."""
+        return Group({name: np.asarray(described[1]) for name, described in self.arrays.items()}, self.attrs)
 
     def to_dataset(self) -> xr.Dataset:
         """Return the same as a data set of xarray."""
@@ -95,6 +101,20 @@ def _shrinks(array: NDArray[Any]) -> bool:
 def _write_attributes(file: Any, attributes: Mapping[str, str | float] | None = None) -> None:
     for name, value in (attributes or {}).items():
         file.attrs[name] = value if isinstance(value, str) else np.atleast_1d(value)
+
+
+def digest(groups: Mapping[str, Group]) -> str:
+    """Return a digest of all arrays of numbers and attributes of groups, the same for every type of the numbers."""
+    found = sha256()
+    for name, group in sorted(groups.items()):
+        attributes = {
+            f"@{key}": value if isinstance(value, str) else np.squeeze(value) for key, value in group.attrs.items()
+        }
+        for key, value in sorted((group.arrays | attributes).items()):
+            numbers = np.zeros(0) if isinstance(value, str) else np.asarray(value, dtype=np.float64)
+            found.update(repr((name, key, value if isinstance(value, str) else numbers.shape)).encode())
+            found.update(numbers.tobytes())
+    return found.hexdigest()
 
 
 def save_groups(groups: Mapping[str, LabelledGroup], path: Path) -> None:

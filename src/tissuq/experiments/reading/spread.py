@@ -119,7 +119,7 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
             without_mean(of_stress),
             *ROLES[choice.load],
         )
-        if kind and is_of_load and column not in ends and not table.is_constant(column):
+        if kind and is_of_load and column not in ends and table.has_numbers(column):
             by_kind.setdefault(kind, []).append(column)
     for kind in (*SPREADS, ""):
         columns = by_kind.get(kind or "open", [])

@@ -138,7 +138,11 @@ class Table:
     def is_constant(self, column: int) -> bool:
         """Tell whether a column (counted from 0) has the same cell, or no number, in some rows that are not empty."""
         cells = set(self.some_rows(FEW_ROWS).texts(column)) - {""}
-        return len(cells) < 2 or not any(NUMBER.fullmatch(cell) for cell in cells)
+        return len(cells) < 2 or not self.has_numbers(column)
+
+    def has_numbers(self, column: int) -> bool:
+        """Tell whether some of a column's cells (counted from 0) are numbers."""
+        return any(NUMBER.fullmatch(cell) for cell in self.some_rows(FEW_ROWS).texts(column))
 
     def varies(self, column: int) -> bool:
         """Tell whether the numbers in a column (counted from 0) differ by more than a sensor's own error."""
