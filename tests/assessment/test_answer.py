@@ -204,6 +204,15 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     assert "design" in vague.answer.next_step.shell
 
 
+def test_slack_is_next_before_the_instability_that_it_causes():
+    way = np.maximum(np.linspace(1, 1.3, 45) - 0.04, 1)
+    stress = 10 * (way - way**-2) + np.random.default_rng(11).normal(0, 0.03, 45)
+    posterior = tq.fit(pd.DataFrame({"stretch": np.linspace(1, 1.3, 45), "stress [kPa]": stress}))
+    cautions = [warning.code for warning in posterior.warnings if warning.severity is Severity.CAUTION]
+    assert cautions[:2] == ["slack", "unstable"]
+    assert posterior.answer.next_step == STEPS["slack"]
+
+
 @pytest.mark.slow
 def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are_next():
     data = [tq.datasets.load(f"rubber-treloar-{mode}") for mode in ("uniaxial", "equibiaxial", "planar")]
