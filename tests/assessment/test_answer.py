@@ -57,7 +57,10 @@ def test_a_material_that_is_allowed_to_be_wrong_serves_where_one_mode_was_measur
     assert verdicts(posterior)[:3] == [Verdict.YES, Verdict.YES, Verdict.CARE]
     assert posterior.answer.uses[0].reason.endswith(", errors of the test not included")
     assert "only one mode was measured" in posterior.answer.uses[2].reason
-    assert posterior.answer.next_step.shell.endswith("tissuq design {run} says which helps most.")
+    targets = [f"{mode}:{posterior.stable_ranges[mode].high:.3g}" for mode in ("equibiaxial", "planar")]
+    aimed = " ".join(f"--target {target}" for target in targets)
+    assert posterior.answer.next_step.shell.endswith(f"tissuq design {{run}} {aimed} says which helps most.")
+    assert f"posterior.design(target={targets}) says" in posterior.answer.next_step.python
 
 
 def test_a_sheet_that_was_strained_in_one_proportion_alone_is_judged_as_one_mode_is():
@@ -456,7 +459,7 @@ def test_instability_is_mended_by_fibres_of_a_sheet_and_by_leaving_out_a_fall_of
     solution = SimpleNamespace(model=law, is_of_data=True, is_directed=is_directed)
     uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
     unstable = ResultWarning("stable in only 20 % of the draws.", "unstable")
-    assert next_step(solution, uses, [unstable]) == STEPS[name]
+    assert next_step(solution, uses, {}, [unstable]) == STEPS[name]
 
 
 @pytest.mark.parametrize(

@@ -126,7 +126,7 @@ def answer_of(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
         model.meaning,
         uses,
-        next_step(solution, uses, warnings),
+        next_step(solution, uses, ranges, warnings),
         model.experiment.shown_unit.name,
         _law_in_words(solution, has_stress_at_rest, uses[1].verdict is not Verdict.NO),
         sheet_stresses(solution),
