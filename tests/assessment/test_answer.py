@@ -108,13 +108,13 @@ def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
 def test_how_far_the_law_is_off_alone_is_said_where_it_is_known(share, words, monkeypatch):
     model = SimpleNamespace(discrepancy=discrepancy_named("auto"), material=material_named("yeoh"))
     monkeypatch.setattr(answer, "shares_of_discrepancy", lambda solution: (share, (0.0, 0.0, 0.0)))
-    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=True)
+    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, serves_together=True)
     assert text.startswith(words)
     assert bool(text) == bool(words)
-    of_poor_fit = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=False)
+    of_poor_fit = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, serves_together=False)
     assert of_poor_fit == text.replace(" Use it with the discrepancy, as exported cards do.", "")
     assert (of_poor_fit != text) == bool(words)
-    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True, is_described=True)
+    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True, serves_together=True)
     assert at_rest.startswith("There is stress at rest") == bool(words)
 
 
@@ -213,6 +213,9 @@ def test_slack_is_next_before_the_instability_that_it_causes():
     posterior = tq.fit(pd.DataFrame({"stretch": np.linspace(1, 1.3, 45), "stress [kPa]": stress}))
     cautions = [warning.code for warning in posterior.warnings if warning.severity is Severity.CAUTION]
     assert cautions[:2] == ["slack", "unstable"]
+    assert [use.verdict for use in posterior.answer.uses[1::2]] == [Verdict.YES, Verdict.NO]
+    assert "alone is wrong here" in posterior.answer.law
+    assert "exported cards" not in posterior.answer.law  # which are not to be used
     assert posterior.answer.next_step == STEPS["slack"]
 
 
