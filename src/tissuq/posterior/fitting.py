@@ -75,14 +75,14 @@ def fit(
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     tolerances : Tolerances, mapping of str to float, or str
-        By how much whole tests may be off, and so what the intervals are of: ``"as-tested"``, ``"specimen"`` or
-        ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances("specimen", slack=0)``; a mapping such as
-        ``{"slack": 0.01}`` replaces those of the default one by one, ``Tolerances(slack=0.01)`` has no others. Sizes
-        that are not stated as numbers are at least the ``least_errors`` of the experiment. By default they are of the
-        specimen, or where tests are of several, of the tissue; as tested where the noise of one test is known, or a
-        discrepancy that is no energy alone takes up errors of the test. Unless they are stated as numbers, the spreads
-        between specimens and tests are as large as several tests tell. Standard errors of means that the data state are
-        in all of them but ``"as-tested"``.
+        By how much whole tests may be off, and so what the intervals are of: ``"as-tested"`` (or ``"none"``),
+        ``"specimen"`` or ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances("specimen", slack=0)``; a
+        mapping such as ``{"slack": 0.01}`` replaces those of the default one by one, ``Tolerances(slack=0.01)`` has no
+        others. Sizes that are not stated as numbers are at least the ``least_errors`` of the experiment. By default
+        they are of the specimen, or where tests are of several, of the tissue; as tested where the noise of one test is
+        known, or a discrepancy that is no energy alone takes up errors of the test. Unless they are stated as numbers,
+        the spreads between specimens and tests are as large as several tests tell. Standard errors of means that the
+        data state are in all of them but ``"as-tested"``.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters, importance points of more and
         of ridges too thin for it.
