@@ -1,4 +1,4 @@
-"""What arguments of many functions may be: seeds that generators take and files hold, probabilities, priors, paths."""
+"""What arguments of many functions may be: seeds, switches, probabilities, priors, paths."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping
 from numbers import Integral
 from pathlib import Path
+
+import numpy as np
 
 from tissuq.errors import InputError
 
@@ -22,6 +24,19 @@ def check_seed(seed: object) -> None:
     """
     if not isinstance(seed, Integral) or not 0 <= int(seed) <= MAX_SEED:
         raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, not {seed!r}.")
+
+
+def check_switches(**switches: object) -> None:
+    """Refuse a name, such as ``"none"``, where it is asked whether: as every text it would be taken for yes.
+
+    Raises
+    ------
+    InputError
+        When one of them is neither True nor False.
+    """
+    for name, value in switches.items():
+        if not isinstance(value, bool | np.bool_):
+            raise InputError(f"{name} must be True or False, not {value!r:.80}.")
 
 
 def check_probability(prob: float) -> None:

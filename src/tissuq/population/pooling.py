@@ -17,6 +17,7 @@ from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, NoDiscrepancy, discrepancy_named
 from tissuq.model.noise import Noise
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances
+from tissuq.parameters.checks import check_switches
 from tissuq.parameters.priors import Prior
 from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
@@ -126,6 +127,7 @@ def fit_population(
     symbols = _pooled_symbols(parameters, pooled_material)
     if not (np.isfinite(spread) and spread > 0):
         raise InputError(f"spread must be a positive number, not {spread!r}.")
+    check_switches(shared_discrepancy=shared_discrepancy)
     if shared_discrepancy and isinstance(discrepancy_named(discrepancy), NoDiscrepancy):
         raise InputError(
             "a shared discrepancy needs specimens that are fitted with one: choose a discrepancy such as 'auto', or "
