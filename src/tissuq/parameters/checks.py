@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from numbers import Integral
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,34 @@ def check_seed(seed: object) -> None:
     """
     if not isinstance(seed, Integral) or not 0 <= int(seed) <= MAX_SEED:
         raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, not {seed!r}.")
+
+
+def check_count(count: object, rule: str) -> None:
+    """Refuse what is no whole number, one or more, with the rule that it breaks.
+
+    Raises
+    ------
+    InputError
+        When it is none.
+    """
+    if not isinstance(count, Integral) or isinstance(count, bool) or count < 1:
+        raise InputError(f"{rule}, not {count!r:.80}.")
+
+
+def one_or_several(values: Any, kinds: type | tuple[type, ...], rule: str) -> list[Any]:
+    """Return one value of some kinds, or several, as a list; an empty one where there is none.
+
+    Raises
+    ------
+    InputError
+        When one is of another kind, with the rule that it breaks.
+    """
+    is_one = isinstance(values, kinds) or not isinstance(values, Iterable)
+    listed = [] if values is None else [values] if is_one else list(values)
+    for value in listed:
+        if not isinstance(value, kinds):
+            raise InputError(f"{rule}, not {value!r:.80}.")
+    return listed
 
 
 def check_switches(**switches: object) -> None:
@@ -47,8 +76,8 @@ def check_probability(prob: float) -> None:
     InputError
         When it is not between 0 and 1.
     """
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    if not isinstance(prob, Real) or not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob!r}.")
 
 
 def check_priors(priors: object) -> None:
