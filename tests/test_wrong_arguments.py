@@ -13,6 +13,11 @@ DATA = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.02, seed=1)
 TABLE = pd.DataFrame({"stretch": STRETCH, "stress [MPa]": DATA.stress})
 POSTERIOR = tq.fit(DATA, discrepancy="none", noise_sd=0.02)
 DRAWS = POSTERIOR.ensemble(2)
+SPECIMENS = dict.fromkeys("abc", DATA)
+
+
+def pooled(**options):
+    return tq.fit_population(SPECIMENS, discrepancy="none", **options)
 
 
 @pytest.mark.parametrize(
@@ -42,6 +47,11 @@ DRAWS = POSTERIOR.ensemble(2)
         (lambda: POSTERIOR.save(None), "a file is needed, not None"),
         (lambda: tq.write_cards(POSTERIOR, "cards"), "draws are needed, as posterior.ensemble"),
         (lambda: tq.write_cards(DRAWS, None), "a new folder is needed, not None"),
+        (lambda: pooled(parameters=-1), "parameters to pool must be a list of C10, not -1"),
+        (lambda: pooled(spread="wide"), "spread must be a positive number, not 'wide'"),
+        (lambda: pooled(noise_sd=[0.02, 0.03, 0.02]), "noise_sd must be one for all, or by specimen"),
+        (lambda: pooled(tolerances=0.1), "tolerances must be such as"),
+        (lambda: pooled(shared_discrepancy="none"), "shared_discrepancy must be True or False"),
         (lambda: DRAWS.stress(None, [1.1]), "no loading mode named 'None'"),
         (lambda: DRAWS.stress("planar", [-0.1]), "stretch -0.1 at position 0 is not positive"),
         (lambda: DRAWS.stress("planar", "x"), "stretch must be an array of numbers"),

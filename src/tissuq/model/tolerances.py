@@ -321,6 +321,24 @@ def _effect(error: MeasurementError, points: ErrorPoints) -> FloatArray:
     return effect
 
 
+def stated_tolerances(stated: Tolerances | Mapping[str, float | str] | str) -> Tolerances:
+    """Return tolerances as people state them: themselves, by an estimand, or by sizes without others.
+
+    Raises
+    ------
+    InputError
+        When they are none of these.
+    """
+    if isinstance(stated, Mapping):
+        return Tolerances(**stated)
+    if isinstance(stated, Tolerances | str):
+        return stated if isinstance(stated, Tolerances) else Tolerances(stated)
+    raise InputError(
+        "tolerances must be such as {'slack': 0.01} or tissuq.Tolerances(stress=0.1), or one of "
+        f"{', '.join(ESTIMANDS)}, not {stated!r}."
+    )
+
+
 BETWEEN_SPECIMENS = Tolerances(stress=ESTIMANDS[TISSUE].sizes["stress"])
 """For tests of different specimens, where the discrepancy takes up other errors: their stresses agree to 18 %."""
 

@@ -19,7 +19,7 @@ from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.model.tolerances import AS_TESTED, ESTIMANDS, Tolerances
+from tissuq.model.tolerances import AS_TESTED, Tolerances, stated_tolerances
 from tissuq.parameters.checks import check_priors, check_seed
 from tissuq.parameters.priors import Prior
 from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
@@ -195,17 +195,9 @@ def fit_many(
         )
     _refuse_several(material, priors, reading.get("mode"))
     experiments = [measurements(data, OPTIONS, **reading) for data in datasets]
-    if isinstance(tolerances, str):
-        tolerances = Tolerances(tolerances)
     replacing = dict(tolerances) if isinstance(tolerances, Mapping) else {}
-    if isinstance(tolerances, Mapping):
-        Tolerances(**replacing)  # which refuses what is no size of an error
-        tolerances = None
-    if tolerances is not None and not isinstance(tolerances, Tolerances):
-        raise InputError(
-            "tolerances must be such as {'slack': 0.01} or tissuq.Tolerances(stress=0.1), or one of "
-            f"{', '.join(ESTIMANDS)}, not {tolerances!r}."
-        )
+    given = None if tolerances is None else stated_tolerances(tolerances)
+    tolerances = None if isinstance(tolerances, Mapping) else given
     if method not in METHODS:
         raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
     check_seed(seed)
