@@ -8,8 +8,6 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tissuq.errors import InputError
 
 MAX_SEED = 2**62
@@ -64,7 +62,7 @@ def check_switches(**switches: object) -> None:
         When one of them is neither True nor False.
     """
     for name, value in switches.items():
-        if not isinstance(value, bool | np.bool_):
+        if value not in (True, False):
             raise InputError(f"{name} must be True or False, not {value!r:.80}.")
 
 
