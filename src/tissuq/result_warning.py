@@ -24,6 +24,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
     {
         "not-converged": "Sampling has not converged.",
         "doubtful-reading": "The file states no unit, or a column was read whose name says something else.",
+        "large-noise": "The noise that was given is larger than every stress of a test.",
         "stress-at-rest": "There is stress at the reference state, which no elastic material has.",
         "large-drift": "Back at the first stretch, the stress is another one by more than 15 % of the largest.",
         "tests-apart": "Several tests differ by more than tests of one tissue are assumed to.",

@@ -219,6 +219,17 @@ def test_slack_is_next_before_the_instability_that_it_causes():
     assert posterior.answer.next_step == STEPS["slack"]
 
 
+def test_known_noise_of_another_unit_is_the_first_warning():
+    stretch = np.linspace(1, 1.3, 20)
+    data = tq.Experiment("uniaxial", stretch, 10 * (stretch - stretch**-2), stress_unit="kPa")
+    posterior = tq.fit(data, discrepancy="none", noise_sd=0.05)  # MPa, where kPa were meant
+    first = posterior.warnings[0]
+    assert (first.code, first.severity) == ("large-noise", Severity.PROBLEM)
+    assert "50 kPa, is larger than the largest stress, 7.08 kPa" in first
+    assert posterior.answer.next_step == STEPS["problem"]
+    assert not any(warning.code == "large-noise" for warning in tq.fit(data, noise_sd="7 kPa").warnings)
+
+
 @pytest.mark.slow
 def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are_next():
     data = [tq.datasets.load(f"rubber-treloar-{mode}") for mode in ("uniaxial", "equibiaxial", "planar")]
