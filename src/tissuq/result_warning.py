@@ -24,6 +24,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
     {
         "not-converged": "Sampling has not converged.",
         "doubtful-reading": "The file states no unit, or a column was read whose name says something else.",
+        "large-noise": "The noise that was given is larger than every stress of a test.",
         "stress-at-rest": "There is stress at the reference state, which no elastic material has.",
         "large-drift": "Back at the first stretch, the stress is another one by more than 15 % of the largest.",
         "tests-apart": "Several tests differ by more than tests of one tissue are assumed to.",
@@ -31,6 +32,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "unmodelled-curve": "The fitted curve does not follow the measured one.",
         "measurements": "Something in the file or in the course of the test is implausible.",
         "few-measurements": "There are too few measurements to show how the stress deviates from the material.",
+        "slack": "The specimen bears no load at the beginning of the test.",
         "unstable": "Material and discrepancy are stable in fewer than half of the draws over the measured range.",
         "best-fit-target": "The discrepancy aims at the best fit of the material, not at its initial modulus.",
         "no-discrepancy": "No error of the forward model is allowed for.",
@@ -43,7 +45,6 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "correlated-residuals": "The residuals of consecutive measurements are correlated.",
         "inaccurate-integral": "Numerical integration is inaccurate.",
         "not-near-reference": "Nothing is measured near the reference state.",
-        "slack": "The specimen bears no load at the beginning of the test.",
         "poorly-determined": "The data determine the headline parameter poorly.",
         "one-direction": "There is tension or compression only.",
         "no-direction-looked-for": "A preferred direction is not looked for, because a test measured one axis alone.",

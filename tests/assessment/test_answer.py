@@ -57,7 +57,10 @@ def test_a_material_that_is_allowed_to_be_wrong_serves_where_one_mode_was_measur
     assert verdicts(posterior)[:3] == [Verdict.YES, Verdict.YES, Verdict.CARE]
     assert posterior.answer.uses[0].reason.endswith(", errors of the test not included")
     assert "only one mode was measured" in posterior.answer.uses[2].reason
-    assert posterior.answer.next_step.shell.endswith("tissuq design {run} says which helps most.")
+    targets = [f"{mode}:{posterior.stable_ranges[mode].high:.3g}" for mode in ("equibiaxial", "planar")]
+    aimed = " ".join(f"--target {target}" for target in targets)
+    assert posterior.answer.next_step.shell.endswith(f"tissuq design {{run}} {aimed} says which helps most.")
+    assert f"posterior.design(target={targets}) says" in posterior.answer.next_step.python
 
 
 def test_a_sheet_that_was_strained_in_one_proportion_alone_is_judged_as_one_mode_is():
@@ -105,13 +108,13 @@ def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
 def test_how_far_the_law_is_off_alone_is_said_where_it_is_known(share, words, monkeypatch):
     model = SimpleNamespace(discrepancy=discrepancy_named("auto"), material=material_named("yeoh"))
     monkeypatch.setattr(answer, "shares_of_discrepancy", lambda solution: (share, (0.0, 0.0, 0.0)))
-    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=True)
+    text = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, serves_together=True)
     assert text.startswith(words)
     assert bool(text) == bool(words)
-    of_poor_fit = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, is_described=False)
+    of_poor_fit = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=False, serves_together=False)
     assert of_poor_fit == text.replace(" Use it with the discrepancy, as exported cards do.", "")
     assert (of_poor_fit != text) == bool(words)
-    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True, is_described=True)
+    at_rest = answer._law_in_words(SimpleNamespace(model=model), has_stress_at_rest=True, serves_together=True)
     assert at_rest.startswith("There is stress at rest") == bool(words)
 
 
@@ -202,6 +205,29 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     assert "--preload auto" in answer_with(vague, slack).next_step.shell
     assert "design" in answer_with(vague, torn.as_note()).next_step.shell
     assert "design" in vague.answer.next_step.shell
+
+
+def test_slack_is_next_before_the_instability_that_it_causes():
+    way = np.maximum(np.linspace(1, 1.3, 45) - 0.04, 1)
+    stress = 10 * (way - way**-2) + np.random.default_rng(11).normal(0, 0.03, 45)
+    posterior = tq.fit(pd.DataFrame({"stretch": np.linspace(1, 1.3, 45), "stress [kPa]": stress}))
+    cautions = [warning.code for warning in posterior.warnings if warning.severity is Severity.CAUTION]
+    assert cautions[:2] == ["slack", "unstable"]
+    assert [use.verdict for use in posterior.answer.uses[1::2]] == [Verdict.YES, Verdict.NO]
+    assert "alone is wrong here" in posterior.answer.law
+    assert "exported cards" not in posterior.answer.law  # which are not to be used
+    assert posterior.answer.next_step == STEPS["slack"]
+
+
+def test_known_noise_of_another_unit_is_the_first_warning():
+    stretch = np.linspace(1, 1.3, 20)
+    data = tq.Experiment("uniaxial", stretch, 10 * (stretch - stretch**-2), stress_unit="kPa")
+    posterior = tq.fit(data, discrepancy="none", noise_sd=0.05)  # MPa, where kPa were meant
+    first = posterior.warnings[0]
+    assert (first.code, first.severity) == ("large-noise", Severity.PROBLEM)
+    assert "50 kPa, is larger than the largest stress, 7.08 kPa" in first
+    assert posterior.answer.next_step == STEPS["problem"]
+    assert not any(warning.code == "large-noise" for warning in tq.fit(data, noise_sd="7 kPa").warnings)
 
 
 @pytest.mark.slow
@@ -447,7 +473,7 @@ def test_instability_is_mended_by_fibres_of_a_sheet_and_by_leaving_out_a_fall_of
     solution = SimpleNamespace(model=law, is_of_data=True, is_directed=is_directed)
     uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
     unstable = ResultWarning("stable in only 20 % of the draws.", "unstable")
-    assert next_step(solution, uses, [unstable]) == STEPS[name]
+    assert next_step(solution, uses, {}, [unstable]) == STEPS[name]
 
 
 @pytest.mark.parametrize(

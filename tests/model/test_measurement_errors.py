@@ -160,6 +160,7 @@ def test_an_estimand_is_a_set_of_sizes_that_single_ones_replace():
     assert other.with_sizes(stress=0.3).sizes == other.sizes | {"stress": 0.3}
     assert eval(repr(other)) == other
     assert (specimen.has_standard_spreads, Tolerances("specimen", test=0.3).has_standard_spreads) == (True, False)
+    assert Tolerances("none") == Tolerances("as-tested") == Tolerances()  # as --tolerance none
     with pytest.raises(tq.InputError, match="there is no estimand 'patient'"):
         Tolerances("patient")
 

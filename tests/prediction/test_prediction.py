@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import multivariate_normal, norm
 
@@ -255,3 +256,11 @@ def test_a_band_beyond_the_data_has_draws_where_the_posterior_has_weight():
     )
     for name in ("median", "low", "high"):  # of 6000 draws, ends known to 2 or 3 % of the width
         np.testing.assert_allclose((vars(many)[name] - vars(one)[name]) / (one.high - one.low), 0, atol=0.08)
+
+
+def test_the_name_of_a_discrepancy_is_not_taken_for_a_prediction_with_it():
+    posterior = gallery.fit(DATA, discrepancy="none", noise_sd=0.2)
+    for option in ("discrepancy", "noise"):
+        with pytest.raises(tq.InputError, match=f"{option} must be True or False, not 'none'"):
+            posterior.predict(NEW, **{option: "none"})
+    pd.testing.assert_frame_equal(posterior.predict(NEW, noise=np.False_), posterior.predict(NEW, noise=False))

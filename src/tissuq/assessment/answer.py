@@ -126,22 +126,23 @@ def answer_of(
         (_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])),
         model.meaning,
         uses,
-        next_step(solution, uses, warnings),
+        next_step(solution, uses, ranges, warnings),
         model.experiment.shown_unit.name,
-        _law_in_words(solution, has_stress_at_rest, uses[1].verdict is not Verdict.NO),
+        _law_in_words(solution, has_stress_at_rest, all(uses[each].verdict is not Verdict.NO for each in (1, 3))),
         sheet_stresses(solution),
     )
 
 
-def _law_in_words(solution: Solution, has_stress_at_rest: bool, is_described: bool) -> str:
+def _law_in_words(solution: Solution, has_stress_at_rest: bool, serves_together: bool) -> str:
     """Return in words how far the law by itself is from the measurements; nothing where it describes them.
 
-    That it is to be used with the discrepancy is said where both together describe the measurements.
+    That it is to be used with the discrepancy, as in cards, is said where both together describe the measurements and
+    serve finite elements.
     """
     (mean, low, high), _ = shares_of_discrepancy(solution)
     if not has_energy(solution.model) or mean <= NOTABLE_SHARE:
         return ""
-    law, together = solution.model.material.name, f" {TOGETHER}" * is_described
+    law, together = solution.model.material.name, f" {TOGETHER}" * serves_together
     if has_stress_at_rest:
         return f"There is stress at rest, so that it cannot be said how far {law} alone is off."
     if mean <= PRECISE:

@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 from tissuq.assessment.measurements import falls
 from tissuq.assessment.shares import shares_of_discrepancy
+from tissuq.assessment.stability import StableRange
 from tissuq.assessment.uses import PRECISE, SPREAD, Use, Verdict, may_be_of_one_specimen
+from tissuq.experiments.experiment import Experiment
 from tissuq.inference.solution import Solution
 from tissuq.result_warning import ResultWarning, Severity, has_code
 
@@ -69,8 +71,8 @@ STEPS: Mapping[str, Step] = {
     "apart": Step(*["find out why the tests contradict each other, as the warning says."] * 2),
     "curve": Step(*["act on the warning about the measured curve, which the fit does not follow."] * 2),
     "second mode": Step(
-        "measure a second loading mode; tissuq design {run} says which helps most.",
-        "measure a second loading mode; posterior.design() says which helps most.",
+        "measure a second loading mode; tissuq design {run}{targets} says which helps most.",
+        "measure a second loading mode; posterior.design({targets}) says which helps most.",
     ),
     "stable": Step(
         "restrict the fit to stable materials: fit again with --stable-in all.",
@@ -111,7 +113,12 @@ MAY_BE_SPECIMENS = "they may be tests of several specimens"
 """What a warning about cycles says of those whose unloading was not recorded."""
 
 
-def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
+def next_step(
+    solution: Solution,
+    uses: Sequence[Use],
+    ranges: Mapping[str, StableRange],
+    warnings: Sequence[ResultWarning],
+) -> Step:
     """Return the one thing to do next, the severest of the warnings first."""
     if any(warning.severity is Severity.PROBLEM for warning in warnings):
         return STEPS["problem"]
@@ -141,8 +148,19 @@ def next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Result
         is_law_wrong = model.material.is_isotropic and shares_of_discrepancy(solution)[0][0] > PRECISE
         return STEPS["law" if is_law_wrong else "design"]
     if predicting is not Verdict.YES and len(model.experiment.modes) == 1:
-        return STEPS["second mode"]
+        return _with_targets(STEPS["second mode"], model.experiment, ranges)
     return STEPS["export" if simulating is not Verdict.NO else "design"]
+
+
+def _with_targets(step: Step, experiment: Experiment, ranges: Mapping[str, StableRange]) -> Step:
+    """Return a step that aims at the stress of every mode that was not measured, at the end of its strains."""
+    measured = {mode.name for mode in experiment.modes}
+    ends = {name: each.high if each.high > 1 else each.low for name, each in ranges.items() if name not in measured}
+    targets = [f"{name}:{end:.3g}" for name, end in ends.items()]
+    return Step(
+        step.shell.replace("{targets}", "".join(f" --target {target}" for target in targets)),
+        step.python.replace("{targets}", f"target={targets}" if targets else ""),
+    )
 
 
 def _with_options(step: Step, warning: ResultWarning, others: Sequence[ResultWarning] = ()) -> Step:

@@ -16,7 +16,7 @@ from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.emulation.warnings import calibration_warnings
 from tissuq.inference.marginal import Marginal
-from tissuq.parameters.checks import check_probability
+from tissuq.parameters.checks import check_probability, check_switches
 from tissuq.posterior.netcdf import LabelledGroup, save_groups, tree_of
 from tissuq.prediction.bands import Mixtures
 from tissuq.result_warning import ResultWarning
@@ -210,6 +210,7 @@ class Calibration:
         import pandas as pd
 
         check_probability(prob)
+        check_switches(discrepancy=discrepancy, noise=noise)
         mean, variance = self.likelihood.predictions(self.draws(PREDICTION_DRAWS), discrepancy=discrepancy, noise=noise)
         mixture = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
         low, high = (mixture.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))

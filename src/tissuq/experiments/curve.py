@@ -12,6 +12,7 @@ from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.drawing.panels import Panels, shortened, small_panels
 from tissuq.drawing.pieces import points
 from tissuq.drawing.style import BASE, inline_svg, relative_size
+from tissuq.errors import InputError
 from tissuq.experiments.branches import unloading
 from tissuq.experiments.modes import LoadingMode, Path
 from tissuq.experiments.modes.mode import values_of_control
@@ -72,6 +73,11 @@ class Curve:
     averaged: int = 1
     apart: int = 1
     warnings: tuple[ResultWarning, ...] = ()
+
+    def __post_init__(self) -> None:
+        for label in ("name", "source", "specimen", "direction", "condition"):
+            if not isinstance(text := getattr(self, label), str):
+                raise InputError(f"{label} must be a text, such as '{text}', not {text!r:.80}.")
 
     def __len__(self) -> int:
         return len(self.stress)

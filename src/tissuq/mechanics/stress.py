@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.arrays import BoolArray, FloatArray
-from tissuq.errors import ModelError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, Path, SimpleShear, States
 from tissuq.experiments.modes.path import STEP, UNMEASURED, Deformation
 from tissuq.mechanics.equilibrium import energy_in_equilibrium, has_free_axis
@@ -64,7 +64,17 @@ def engineering_stress(
     ----------
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
     """
+    _refuse_names(material=material, mode=mode)
     return stresses_at(material, mode.at(stretch), values)
+
+
+def _refuse_names(**objects: object) -> None:
+    for what, named in objects.items():
+        if isinstance(named, str):
+            kinds = {"material": "materials", "mode": "loading_modes"}[what]
+            raise InputError(
+                f"{what} must be an object, not a name: tissuq.{kinds}()['{named}'](). tissuq.simulate takes names."
+            )
 
 
 def stresses_at(material: Material, states: States, values: ArrayLike) -> FloatArray:
@@ -287,6 +297,7 @@ def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:
 
 def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
     """Return the shear modulus at the reference, in MPa: the initial slope in simple shear."""
+    _refuse_names(material=material)
     with _explained(material):
         return float(_initial_slope(material)(np.asarray(values, dtype=np.float64)))
 

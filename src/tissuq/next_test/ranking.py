@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tissuq.inference.solution import Solution
 from tissuq.next_test.candidates import Candidate, candidate_named, default_candidates
 from tissuq.next_test.next_test import NextTest, Specimen
 from tissuq.next_test.targets import MODULUS, Target, target_named
+from tissuq.parameters.checks import check_count, check_seed, one_or_several
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,16 +24,22 @@ MAX_MEASURED_REACH = 1 + 1e-6
 """Largest reach of a stretch whose invariants were measured."""
 TOLD_APART, NEGLIGIBLE = 2.0, 0.01
 """Standard errors of the difference of two reductions from which it is one, and what of it matters to no laboratory."""
+RULES = {
+    "points": "a test has one measurement or more: points must be whole numbers",
+    "target": "target must be 'modulus', a parameter, or a stress such as 'planar:1.5'",
+    "candidates": "candidates must be such as 'planar 1:1.5 20'",
+}
+"""What may be asked for."""
 TIED = "as good as the best"
 FEW_COMPONENTS = "inaccurate: few components of the posterior would remain"
 
 
 def rank_tests(
     solution: Solution,
-    candidates: Sequence[str | Candidate] = (),
-    targets: Sequence[str | Target] = (),
+    candidates: str | Candidate | Sequence[str | Candidate] = (),
+    targets: str | Target | Sequence[str | Target] = (),
     *,
-    points: Sequence[int] = (),
+    points: int | Sequence[int] = (),
     specimen: Specimen | None = None,
     seed: int = 0,
     step: Callable[[str], None] = lambda text: None,
@@ -41,11 +49,11 @@ def rank_tests(
     Parameters
     ----------
     solution : Solution
-    candidates : sequence of str or Candidate
+    candidates : str, Candidate, or sequence of these
         The default ones (`default_candidates`) where there are none; the tests of the data again are always among them.
-    targets : sequence of str or Target
+    targets : str, Target, or sequence of these
         The initial shear modulus where there are none.
-    points : sequence of int
+    points : int, or sequence of int
         Numbers of measurements of the default candidates; as many as the data have where there are none.
     specimen : str, optional
         ``"same"`` or ``"other"``: a test of the specimen of the data, or of another one whose stresses differ as the
@@ -78,18 +86,21 @@ def rank_tests(
     import pandas as pd
 
     model = solution.model
-    if any(count < 1 for count in points):
-        raise InputError(f"a test has one measurement or more, not {min(points)}.")
-    targets_asked = list(dict.fromkeys(target_named(candidate, model) for candidate in targets or [MODULUS]))
+    check_seed(seed)
+    counts = one_or_several(points, Integral, RULES["points"])
+    for count in counts:
+        check_count(count, RULES["points"])
+    asked = one_or_several(targets, (str, Target), RULES["target"])
+    targets_asked = list(dict.fromkeys(target_named(target, model) for target in asked or [MODULUS]))
     next_test = NextTest(solution, targets_asked, specimen, seed)
     for target, sd in zip(targets_asked, next_test.sd_now, strict=True):
         if not sd > 0:
             raise InputError(f"target '{target.name}': its value is known already, so that no test tells more of it.")
     is_energy = model.discrepancy.is_energy and not model.is_correlated
-    defaults = list(default_candidates(model.experiment, model.material, is_energy=is_energy, points=tuple(points)))
+    defaults = list(default_candidates(model.experiment, model.material, is_energy=is_energy, points=tuple(counts)))
     requested = [
         candidate if isinstance(candidate, Candidate) else candidate_named(candidate)
-        for candidate in ([candidates] if isinstance(candidates, str) else candidates)
+        for candidate in one_or_several(candidates, (str, Candidate), RULES["candidates"])
     ]
     ranked = [*[candidate for candidate in defaults if candidate.is_repeat], *requested] if requested else defaults
     stable = _stable(solution, ranked)

@@ -1,11 +1,12 @@
-"""What arguments of many functions may be: seeds that generators take and files hold, probabilities, priors, paths."""
+"""What arguments of many functions may be: seeds, switches, probabilities, priors, paths."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from numbers import Integral
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
 from pathlib import Path
+from typing import Any
 
 from tissuq.errors import InputError
 
@@ -24,6 +25,47 @@ def check_seed(seed: object) -> None:
         raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, not {seed!r}.")
 
 
+def check_count(count: object, rule: str) -> None:
+    """Refuse what is no whole number, one or more, with the rule that it breaks.
+
+    Raises
+    ------
+    InputError
+        When it is none.
+    """
+    if not isinstance(count, Integral) or isinstance(count, bool) or count < 1:
+        raise InputError(f"{rule}, not {count!r:.80}.")
+
+
+def one_or_several(values: Any, kinds: type | tuple[type, ...], rule: str) -> list[Any]:
+    """Return one value of some kinds, or several, as a list; an empty one where there is none.
+
+    Raises
+    ------
+    InputError
+        When one is of another kind, with the rule that it breaks.
+    """
+    is_one = isinstance(values, kinds) or not isinstance(values, Iterable)
+    listed = [] if values is None else [values] if is_one else list(values)
+    for value in listed:
+        if not isinstance(value, kinds):
+            raise InputError(f"{rule}, not {value!r:.80}.")
+    return listed
+
+
+def check_switches(**switches: object) -> None:
+    """Refuse a name, such as ``"none"``, where it is asked whether: as every text it would be taken for yes.
+
+    Raises
+    ------
+    InputError
+        When one of them is neither True nor False.
+    """
+    for name, value in switches.items():
+        if value not in (True, False):
+            raise InputError(f"{name} must be True or False, not {value!r:.80}.")
+
+
 def check_probability(prob: float) -> None:
     """Refuse a probability of an interval that is none, or of all or nothing.
 
@@ -32,8 +74,8 @@ def check_probability(prob: float) -> None:
     InputError
         When it is not between 0 and 1.
     """
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    if not isinstance(prob, Real) or not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob!r}.")
 
 
 def check_priors(priors: object) -> None:

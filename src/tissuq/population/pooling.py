@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
+from numbers import Real
 from statistics import median
 from typing import Any
 
@@ -16,7 +17,8 @@ from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, NoDiscrepancy, discrepancy_named
 from tissuq.model.noise import Noise
-from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances, stated_tolerances
+from tissuq.parameters.checks import check_switches, one_or_several
 from tissuq.parameters.priors import Prior
 from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
@@ -124,8 +126,9 @@ def fit_population(
     specimens = _by_specimen(experiments)
     pooled_material = material_named(material)
     symbols = _pooled_symbols(parameters, pooled_material)
-    if not (np.isfinite(spread) and spread > 0):
+    if not isinstance(spread, Real) or not 0 < spread < np.inf:
         raise InputError(f"spread must be a positive number, not {spread!r}.")
+    check_switches(shared_discrepancy=shared_discrepancy)
     if shared_discrepancy and isinstance(discrepancy_named(discrepancy), NoDiscrepancy):
         raise InputError(
             "a shared discrepancy needs specimens that are fitted with one: choose a discrepancy such as 'auto', or "
@@ -133,8 +136,7 @@ def fit_population(
         )
     _check_deformed(specimens)
     encoded = covariates_of(covariates, list(specimens))
-    of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
-    of_tests = of_tests if isinstance(of_tests, Tolerances) else Tolerances(**of_tests)
+    of_tests = stated_tolerances(AS_TESTED if tolerances is None else tolerances)
     if of_tests.estimand == TISSUE:
         raise InputError(
             f"the errors of the estimand '{TISSUE}' hold how much specimens differ, which a population finds itself: "
@@ -211,6 +213,8 @@ def _check_deformed(specimens: Mapping[str, Sequence[Experiment]]) -> None:
 
 def _noise_of_specimens(noise_sd: Any, specimens: Mapping[str, Sequence[Experiment]]) -> dict[str, Any]:
     """Return the noise of every specimen; a tuple where each of its tests has its own."""
+    if isinstance(noise_sd, Sequence) and not isinstance(noise_sd, str):
+        raise InputError(f"noise_sd must be one for all, or by specimen, such as {{'S1': 0.02}}, not {noise_sd!r}.")
     if not isinstance(noise_sd, Mapping):
         return dict.fromkeys(specimens, noise_sd)
     if foreign := [str(name) for name in noise_sd if name not in specimens]:
@@ -245,8 +249,9 @@ def _pooled_symbols(parameters: Sequence[str] | None, material: Material) -> tup
     symbols = tuple(parameter.symbol for parameter in material.parameters)
     if parameters is None:
         return symbols
-    unknown = [symbol for symbol in parameters if symbol not in symbols]
-    if isinstance(parameters, str) or unknown or not parameters:
-        given_text = parameters if isinstance(parameters, str) else ", ".join(unknown) or "none"
-        raise InputError(f"parameters to pool must be a list of {', '.join(symbols)}; found: {given_text}.")
-    return tuple(symbol for symbol in symbols if symbol in parameters)
+    rule = f"parameters to pool must be a list of {', '.join(symbols)}"
+    pooled = one_or_several(parameters, str, rule)
+    found = [name for name in pooled if name not in symbols or isinstance(parameters, str)]
+    if found or not pooled:
+        raise InputError(f"{rule}; found: {', '.join(found) or 'none'}.")
+    return tuple(symbol for symbol in symbols if symbol in pooled)

@@ -20,7 +20,7 @@ from tissuq.mechanics.invariants import largest_invariants
 from tissuq.mechanics.rays import MAX_CORNER_EXCESS, Range, scores, through, with_errors
 from tissuq.model.discrepancy.blocks import Coordinates
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.checks import check_seed
+from tissuq.parameters.checks import check_count, check_seed
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble, stress_of, stress_within
 from tissuq.prediction.moments import values_of
 
@@ -99,8 +99,7 @@ def _ranges(model: StatisticalModel, modes: Sequence[LoadingMode]) -> dict[str, 
 
 
 def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> None:
-    if count < 1:
-        raise InputError(f"an ensemble has one draw or more, not {count}.")
+    check_count(count, "an ensemble has one draw or more")
     check_seed(seed)
     if sampling not in get_args(Sampling):
         raise InputError(f"sampling must be one of {', '.join(get_args(Sampling))}, not '{sampling}'.")

@@ -18,7 +18,7 @@ from tissuq.arrays import FloatArray
 from tissuq.assessment.stability import measured_range
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
-from tissuq.experiments.checked_arrays import headed
+from tissuq.experiments.checked_arrays import checked_points, headed
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.mechanics import Material, StretchMaterial
@@ -193,9 +193,12 @@ class Ensemble(Sequence[EnergyDraw]):
             ),
         )
 
-    def stress(self, mode: str | LoadingMode | Path, stretch: FloatArray) -> FloatArray:
+    def stress(self, mode: str | LoadingMode | Path, stretch: ArrayLike) -> FloatArray:
         """Return the engineering stresses (N, n), MPa, of all draws at points (n,) of a mode of one stress."""
-        return self.stresses_at((loading_mode(mode) if isinstance(mode, str) else mode).at(np.asarray(stretch)))
+        if isinstance(mode, Path):
+            return self.stresses_at(mode.at(stretch))
+        loading = loading_mode(mode)
+        return self.stresses_at(loading.at(checked_points(loading, np.atleast_1d(stretch))))
 
     def stresses_at(self, states: States) -> FloatArray:
         """Return the engineering stresses (N, n), MPa, of all draws at states (n,)."""

@@ -19,7 +19,7 @@ from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.model.tolerances import AS_TESTED, ESTIMANDS, Tolerances
+from tissuq.model.tolerances import AS_TESTED, Tolerances, stated_tolerances
 from tissuq.parameters.checks import check_priors, check_seed
 from tissuq.parameters.priors import Prior
 from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
@@ -75,14 +75,14 @@ def fit(
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     tolerances : Tolerances, mapping of str to float, or str
-        By how much whole tests may be off, and so what the intervals are of: ``"as-tested"``, ``"specimen"`` or
-        ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances("specimen", slack=0)``; a mapping such as
-        ``{"slack": 0.01}`` replaces those of the default one by one, ``Tolerances(slack=0.01)`` has no others. Sizes
-        that are not stated as numbers are at least the ``least_errors`` of the experiment. By default they are of the
-        specimen, or where tests are of several, of the tissue; as tested where the noise of one test is known, or a
-        discrepancy that is no energy alone takes up errors of the test. Unless they are stated as numbers, the spreads
-        between specimens and tests are as large as several tests tell. Standard errors of means that the data state are
-        in all of them but ``"as-tested"``.
+        By how much whole tests may be off, and so what the intervals are of: ``"as-tested"`` (or ``"none"``),
+        ``"specimen"`` or ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances("specimen", slack=0)``; a
+        mapping such as ``{"slack": 0.01}`` replaces those of the default one by one, ``Tolerances(slack=0.01)`` has no
+        others. Sizes that are not stated as numbers are at least the ``least_errors`` of the experiment. By default
+        they are of the specimen, or where tests are of several, of the tissue; as tested where the noise of one test is
+        known, or a discrepancy that is no energy alone takes up errors of the test. Unless they are stated as numbers,
+        the spreads between specimens and tests are as large as several tests tell. Standard errors of means that the
+        data state are in all of them but ``"as-tested"``.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters, importance points of more and
         of ridges too thin for it.
@@ -195,17 +195,9 @@ def fit_many(
         )
     _refuse_several(material, priors, reading.get("mode"))
     experiments = [measurements(data, OPTIONS, **reading) for data in datasets]
-    if isinstance(tolerances, str):
-        tolerances = Tolerances(tolerances)
     replacing = dict(tolerances) if isinstance(tolerances, Mapping) else {}
-    if isinstance(tolerances, Mapping):
-        Tolerances(**replacing)  # which refuses what is no size of an error
-        tolerances = None
-    if tolerances is not None and not isinstance(tolerances, Tolerances):
-        raise InputError(
-            "tolerances must be such as {'slack': 0.01} or tissuq.Tolerances(stress=0.1), or one of "
-            f"{', '.join(ESTIMANDS)}, not {tolerances!r}."
-        )
+    given = None if tolerances is None else stated_tolerances(tolerances)
+    tolerances = None if isinstance(tolerances, Mapping) else given
     if method not in METHODS:
         raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
     check_seed(seed)

@@ -15,7 +15,7 @@ from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
 from tissuq.model.prior_draws import draw_from_prior
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.checks import check_probability
+from tissuq.parameters.checks import check_count, check_probability
 from tissuq.parameters.parameter import Parameter
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import LeaveOneOut, pointwise_log_likelihood, replicate_data, stride
@@ -77,6 +77,7 @@ def prior_arrays(model: StatisticalModel, draws: int, seed: int, unit: StressUni
 
     Stresses, and parameters that are stresses, are in the unit.
     """
+    check_count(draws, "draws must be one or more")
     generator = np.random.default_rng([seed, 4])
     drawn, stresses = zip(*(draw_from_prior(model, generator) for _ in range(draws)), strict=True)
     sample = {"chain": np.arange(1), "draw": np.arange(draws)}

@@ -28,6 +28,7 @@ from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
+from tissuq.parameters.checks import one_or_several
 from tissuq.pictures.parameters import intervals
 from tissuq.posterior.fitting import OPTIONS, fit
 from tissuq.posterior.least_squares import LeastSquares, least_squares
@@ -385,6 +386,10 @@ def _percent(share: float) -> str:
     return "< 0.1 %" if share < 0.001 else f"{100 * share:.{int(share < 0.1)}f} %"
 
 
+LAWS = "laws must be 'all', or names of materials, such as 'yeoh', or objects of tissuq.Material"
+"""What may be compared."""
+
+
 def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:
     """Return laws by their names, those with few parameters first where all are asked for.
 
@@ -396,7 +401,9 @@ def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:
     if laws == ALL_LAWS:
         all_laws = [kind() for kind in materials().values()]
         return {law.name: law for law in sorted(all_laws, key=lambda law: len(law.parameters)) if law.is_isotropic}
-    named_laws = [material_named(law) for law in ([laws] if isinstance(laws, str) else laws)]
+    named_laws = list(map(material_named, one_or_several(laws, (str, Material), LAWS)))
+    if not named_laws:
+        raise InputError(f"{LAWS}, and one at least.")
     by_name = {law.name: law for law in named_laws}
     if len(by_name) < len(named_laws):
         raise InputError("a law is named twice: name each of the laws once.")

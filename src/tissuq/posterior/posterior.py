@@ -20,8 +20,8 @@ from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
 from tissuq.errors import ModelError
 from tissuq.experiments.checked_arrays import headed, in_unit
-from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
@@ -233,7 +233,7 @@ class Posterior(PosteriorPlots):
 
     def design(
         self,
-        candidates: Sequence[str | Candidate] = (),
+        candidates: str | Candidate | Sequence[str | Candidate] = (),
         target: str | Target | Sequence[str | Target] = (),
         **options: Any,
     ) -> pd.DataFrame:
@@ -243,7 +243,7 @@ class Posterior(PosteriorPlots):
 
         Parameters
         ----------
-        candidates : sequence of str or Candidate
+        candidates : str, Candidate, or sequence of these
             Such as ``"planar 1:1.5 20"``; usual ones in all modes, unless given.
         target : str, Target, or sequence of these
             ``"modulus"`` (the initial shear modulus, unless given), a parameter, a stress such as ``"planar:1.5"``; or
@@ -257,14 +257,14 @@ class Posterior(PosteriorPlots):
         >>> posterior.design(["uniaxial 0.9:1.1 4", "uniaxial 0.7:1.3 4"]).query("not is_repeat")["low"].tolist()
         [0.7, 0.9]
         """
-        targets = [target] if isinstance(target, (str, Target)) else target
-        return rank_tests(self.solution, candidates, targets, **options)
+        return rank_tests(self.solution, candidates, target, **options)
 
-    def update(self, more: Experiment) -> Posterior:
+    def update(self, more: Any) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.
 
         Where noise and discrepancy are independent from point to point and the stress is linear in its parameters, the
-        measurements so far enter by their sufficient statistics, and only the new ones are read.
+        measurements so far enter by their sufficient statistics, and only the new ones are read. They may be all that
+        `tissuq.fit` takes.
 
         Raises
         ------
@@ -281,7 +281,7 @@ class Posterior(PosteriorPlots):
         >>> bool(after.summary().loc["C10", "sd"] < before.summary().loc["C10", "sd"])
         True
         """
-        return Posterior(self.solver.solve([self.model.with_more(more)])[0], self.solver)
+        return Posterior(self.solver.solve([self.model.with_more(measurements(more))])[0], self.solver)
 
     def summary(
         self, prob: float = 0.95, parameters: Sequence[str] | None = None, unit: str | None = None
@@ -374,7 +374,7 @@ class Posterior(PosteriorPlots):
 
     def scores(
         self,
-        test: Experiment,
+        test: Any,
         *,
         discrepancy: bool = True,
         prob: float = 0.95,
@@ -385,9 +385,9 @@ class Posterior(PosteriorPlots):
 
         Parameters
         ----------
-        test : Experiment
-            Its measurements without stress are left out: at rest it is zero by definition. Where means of several
-            measurements were fitted (more than 2000 rows), those of as many are judged.
+        test : Experiment, str, path or table, or sequence of these
+            As `tissuq.fit` takes it. Its measurements without stress are left out: at rest it is zero by definition.
+            Where means of several measurements were fitted (more than 2000 rows), those of as many are judged.
         discrepancy, prob, stress_type, unit
             As of `predict`.
 
@@ -409,7 +409,9 @@ class Posterior(PosteriorPlots):
         >>> bool(found["inside"][0] > 0.7), bool(found["crps"][0] < 0.03)
         (True, True)
         """
-        table = scores_of(self.solution, test, discrepancy=discrepancy, prob=prob, stress_type=stress_type)
+        table = scores_of(
+            self.solution, measurements(test), discrepancy=discrepancy, prob=prob, stress_type=stress_type
+        )
         return in_unit(table, ["crps", "interval_score"], self.unit(unit).name)
 
     def ensemble(self, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True) -> Ensemble:
@@ -554,7 +556,9 @@ class Posterior(PosteriorPlots):
 
     def save(self, path: str | Path) -> None:
         """Write the whole posterior as NetCDF: `data`, which ArviZ and xarray open, and what `load` needs."""
-        save_groups(self._groups(self.unit()) | solution_groups(self.solution, self.solver), Path(path))
+        save_groups(
+            self._groups(self.unit()) | solution_groups(self.solution, self.solver), checked_path(path, "a file")
+        )
 
     @classmethod
     def load(

@@ -19,6 +19,7 @@ from tissuq.experiments.experiment import labels_of_tests
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ScaleError, TestError
+from tissuq.model.noise import KnownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import ESTIMANDS
 from tissuq.parameters.priors import Interval, Uniform
@@ -97,6 +98,8 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
         yield _instability(solution, min(ranges.values(), key=lambda stable_range: stable_range.probability))
     if not solution.is_of_data:
         return
+    if large := _large_noise(solution.model):
+        yield large
     if solution.stable_share < MIN_LOSS_PROBABILITY:
         yield ResultWarning(
             "the data contradict the stability constraint (stable_in): without it, only a fraction of "
@@ -172,6 +175,25 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
             "prior-bound",
             symbols=[symbol for symbol, _ in cut],
         )
+
+
+def _large_noise(model: StatisticalModel) -> ResultWarning | None:
+    """Return the warning about known noise that no measurement of a test stands out of, as of another unit."""
+    if not isinstance(model.noise, KnownNoise):
+        return None
+    unit = model.experiment.shown_unit
+    for test, sd in zip(model.experiment.tests, model.noise.of_tests(model.experiment) / unit.to_mpa, strict=True):
+        largest = float(np.abs(test.measured).max()) / unit.to_mpa
+        if sd > largest:
+            return ResultWarning(
+                f"the noise that was given, {sd:.3g} {unit.name}, is larger than the largest stress, {largest:.3g} "
+                f"{unit.name}, so that the measurements tell nothing. Give it in the right unit, or leave it unknown "
+                "({noise_sd}).",
+                "large-noise",
+                Severity.PROBLEM,
+                noise_sd="unknown",
+            )
+    return None
 
 
 def _instability(solution: Solution, stable_range: StableRange) -> ResultWarning:

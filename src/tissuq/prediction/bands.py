@@ -22,7 +22,7 @@ from tissuq.mechanics.equilibrium import why_no_equilibrium
 from tissuq.model.compatibility import check_lateral_stretch
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.checks import check_probability
+from tissuq.parameters.checks import check_probability, check_switches
 from tissuq.prediction.moments import variance_of_noise
 from tissuq.prediction.stress import Stress
 
@@ -213,6 +213,8 @@ def predict_bands(
     the range of the data, if asked for. All else is as for `predict_band`.
     """
     solutions = [solution for _, solution in weighted_solutions]
+    for noise in noises:
+        check_switches(noise=noise)
     if curve is not None:
         mode, channel = curve.mode, curve.channel
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
@@ -303,6 +305,7 @@ def asked_for(
     loading = loading_mode(mode) if mode is not None else _only_mode(solutions[0].model.experiment)
     points = checked_points(loading, np.atleast_1d(stretch))
     check_probability(prob)
+    check_switches(discrepancy=discrepancy)
     if not 0 <= channel < len(loading.stresses):
         raise InputError(f"mode '{loading.name}' has the stresses {', '.join(loading.stresses)}: no number {channel}.")
     for solution in solutions:

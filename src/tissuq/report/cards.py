@@ -7,8 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from tissuq.errors import InputError
 from tissuq.export import Cards, CardSettings, card_format
 from tissuq.export.cards import distances_from_median
+from tissuq.parameters.checks import checked_path
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.report.run_folder import run_folder
 
@@ -61,7 +63,9 @@ def write_cards(
     >>> print(cards.files["draw-1.inp"].splitlines()[-2])
     *HYPERELASTIC, YEOH
     """
-    with run_folder(Path(folder), "export", force=force) as scratch:
+    if not isinstance(ensemble, Ensemble):
+        raise InputError(f"draws are needed, as posterior.ensemble(20) returns them, not {ensemble!r:.80}.")
+    with run_folder(checked_path(folder, "a new folder"), "export", force=force) as scratch:
         cards = card_format(format).checked_cards(ensemble, CardSettings(**settings))
         pairs = zip(cards.index, distances_from_median(ensemble).tolist(), strict=True)
         cards = replace(cards, index=tuple({**row, "from_median": distance} for row, distance in pairs))
