@@ -128,7 +128,7 @@ def answer_of(
         uses,
         next_step(solution, uses, ranges, warnings),
         model.experiment.shown_unit.name,
-        _law_in_words(solution, has_stress_at_rest, all(uses[each].verdict is not Verdict.NO for each in (1, 3))),
+        _law_in_words(solution, has_stress_at_rest, all(uses[number].verdict is not Verdict.NO for number in (1, 3))),
         sheet_stresses(solution),
     )
 

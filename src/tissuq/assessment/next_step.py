@@ -155,7 +155,7 @@ def next_step(
 def _with_targets(step: Step, experiment: Experiment, ranges: Mapping[str, StableRange]) -> Step:
     """Return a step that aims at the stress of every mode that was not measured, at the end of its strains."""
     measured = {mode.name for mode in experiment.modes}
-    ends = {name: each.high if each.high > 1 else each.low for name, each in ranges.items() if name not in measured}
+    ends = {name: of.high if of.high > 1 else of.low for name, of in ranges.items() if name not in measured}
     targets = [f"{name}:{end:.3g}" for name, end in ends.items()]
     return Step(
         step.shell.replace("{targets}", "".join(f" --target {target}" for target in targets)),
