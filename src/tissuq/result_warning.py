@@ -41,6 +41,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "stability-contradicted": "The data contradict the stability that was required.",
         "prior-bound": "A bound of a prior, not the data, determines part of the result.",
         "prior-dominates": "A prior that was given determines the result as much as the data do, or more.",
+        "standard-errors-left-out": "Standard errors of means that the data state are not in the intervals.",
         "sharp-prior": "A prior that was given is as sharp as the error that all tests have in common.",
         "correlated-residuals": "The residuals of consecutive measurements are correlated.",
         "inaccurate-integral": "Numerical integration is inaccurate.",

@@ -50,6 +50,24 @@ def test_they_come_with_the_default_and_with_an_estimand_and_not_where_the_test_
     assert fitted(noisy).model.tolerances == Tolerances("specimen")
 
 
+@pytest.mark.parametrize(
+    ("options", "is_told"),
+    [
+        ({"noise_sd": 2e-4}, True),
+        ({"noise": "proportional"}, True),
+        ({"noise_sd": 2e-4, "tolerances": Tolerances(mean=1)}, False),
+        ({"noise_sd": 2e-4, "tolerances": {"mean": 0}}, False),
+        ({"tolerances": "as-tested"}, False),
+        ({}, False),
+    ],
+)
+def test_that_intervals_do_not_hold_them_is_told_unless_it_was_asked_for(options, is_told):
+    noisy = 0.05 * BASIS + 2e-4 * np.random.default_rng(3).standard_normal(31)
+    codes = [warning.code for warning in fitted(noisy, 0.005 * BASIS, **options).warnings]
+    assert ("standard-errors-left-out" in codes) == is_told
+    assert "standard-errors-left-out" not in [warning.code for warning in fitted(noisy, **options).warnings]
+
+
 def test_a_posterior_keeps_them_in_its_file(tmp_path):
     posterior = fitted(0.05 * BASIS + 1e-4 * np.sin(40 * STRAIN), 0.005 * BASIS)
     posterior.save(tmp_path / "fit.nc")

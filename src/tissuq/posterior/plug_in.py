@@ -314,11 +314,13 @@ def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tol
 
     The same where there are none, the noise is known or more than one number, or a discrepancy takes up such errors.
     """
-    noise = model.noise
-    is_open = len(noise.parameters) == 1 and not (model.is_correlated or noise.shares_discrepancy)
-    if not is_open or MeanError.name in tolerances.stated or not model.experiment.standard_error.any():
-        return tolerances
-    return tolerances.with_sizes(**{MeanError.name: 1.0})
+    has_errors = model.experiment.standard_error.any() and MeanError.name not in tolerances.stated
+    return tolerances.with_sizes(**{MeanError.name: 1.0}) if has_errors and takes_standard_errors(model) else tolerances
+
+
+def takes_standard_errors(model: StatisticalModel) -> bool:
+    """Return whether standard errors of means go with the noise and the discrepancy of a model."""
+    return len(model.noise.parameters) == 1 and not (model.is_correlated or model.noise.shares_discrepancy)
 
 
 def _have_one_path(model: StatisticalModel) -> bool:

@@ -18,11 +18,12 @@ from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.experiments.experiment import labels_of_tests
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
-from tissuq.model.measurement_errors import ScaleError, TestError
+from tissuq.model.measurement_errors import MeanError, ScaleError, TestError
 from tissuq.model.noise import KnownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import ESTIMANDS
 from tissuq.parameters.priors import Interval, Uniform
+from tissuq.posterior.plug_in import takes_standard_errors
 from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -106,6 +107,14 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
             f"{solution.stable_share:.1g} of the posterior is stable. The constrained posterior describes the data "
             "less well.",
             "stability-contradicted",
+        )
+    if _leaves_standard_errors_out(solution.model):
+        yield ResultWarning(
+            "the standard errors of the means that the data state are not in the intervals: fit with {noise} and "
+            "{discrepancy}, which include them.",
+            "standard-errors-left-out",
+            noise="unknown",
+            discrepancy="auto",
         )
     if solution.model.discrepancy.is_best_fit:
         yield ResultWarning(solution.model.discrepancy.caution, "best-fit-target")
@@ -271,6 +280,12 @@ def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
 def _describing_discrepancy(model: StatisticalModel) -> str:
     """Return the discrepancy that describes what the law does not, where one may be fitted to these tests."""
     return "gp-pinned" if model.derived_parameters else "auto"
+
+
+def _leaves_standard_errors_out(model: StatisticalModel) -> bool:
+    """Return whether standard errors of the data are left out because they do not go with noise or discrepancy."""
+    is_open = MeanError.name not in model.tolerances.stated and not takes_standard_errors(model)
+    return is_open and bool(model.experiment.standard_error.any())
 
 
 def _directions_of_one_fibre(model: StatisticalModel) -> str:
