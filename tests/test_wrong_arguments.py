@@ -14,6 +14,15 @@ TABLE = pd.DataFrame({"stretch": STRETCH, "stress [MPa]": DATA.stress})
 POSTERIOR = tq.fit(DATA, discrepancy="none", noise_sd=0.02)
 DRAWS = POSTERIOR.ensemble(2)
 SPECIMENS = dict.fromkeys("abc", DATA)
+CONTROL = np.linspace(0.1, 1, 8)
+
+
+def force(parameters, depth):
+    return parameters["mu"] * depth
+
+
+def calibrated(**options):
+    return tq.calibrate(CONTROL, 0.4 * CONTROL, force, {"mu": tq.Uniform(0.1, 1)}, noise_sd=0.01, **options)
 
 
 def pooled(**options):
@@ -44,6 +53,12 @@ def pooled(**options):
         (lambda: POSTERIOR.ensemble(1.5), "one draw or more, not 1.5"),
         (lambda: POSTERIOR.prior_predictive(-1), "draws must be one or more, not -1"),
         (lambda: POSTERIOR.predict([1.1], prob="high"), "prob must be between 0 and 1, not 'high'"),
+        (lambda: POSTERIOR.predict([1.1], channel="x"), "no number x"),
+        (lambda: POSTERIOR.initial_shear_modulus.hdi(95), "prob must be between 0 and 1, not 95"),
+        (lambda: POSTERIOR.initial_shear_modulus.quantile([0.5, 97.5]), "probabilities must be from 0 to 1"),
+        (lambda: POSTERIOR.stability("planar", [0.9, -1.0]), "stretch -1 at position 1 is not positive"),
+        (lambda: POSTERIOR.stability("planar", points=0), "points must be one or more, not 0"),
+        (lambda: DATA.labelled(stress_unit="banana"), "unit 'banana' is not known"),
         (lambda: POSTERIOR.save(None), "a file is needed, not None"),
         (lambda: tq.write_cards(POSTERIOR, "cards"), "draws are needed, as posterior.ensemble"),
         (lambda: tq.write_cards(DRAWS, None), "a new folder is needed, not None"),
@@ -52,6 +67,14 @@ def pooled(**options):
         (lambda: pooled(noise_sd=[0.02, 0.03, 0.02]), "noise_sd must be one for all, or by specimen"),
         (lambda: pooled(tolerances=0.1), "tolerances must be such as"),
         (lambda: pooled(shared_discrepancy="none"), "shared_discrepancy must be True or False"),
+        (lambda: calibrated(runs="many"), "the number of runs must be 1 or more, not 'many'"),
+        (lambda: calibrated(refine=None), "further runs must be 0 or more, not None"),
+        (lambda: calibrated(workers="all"), "workers must be at least 1, not 'all'"),
+        (lambda: calibrated(zero_load="x"), "zero load must be a finite number, not 'x'"),
+        (lambda: calibrated(correlations=0.5), "correlations must be by pairs of parameters"),
+        (lambda: calibrated(emulator="old"), "emulator must be that of an earlier calibration, not 'old'"),
+        (lambda: calibrated(folder=3), "a folder is needed, not 3"),
+        (lambda: tq.write_cards(DRAWS, "cards", bulk_modulus="2 GPa"), "a bulk modulus must be positive, not '2 GPa'"),
         (lambda: DRAWS.stress(None, [1.1]), "no loading mode named 'None'"),
         (lambda: DRAWS.stress("planar", [-0.1]), "stretch -0.1 at position 0 is not positive"),
         (lambda: DRAWS.stress("planar", "x"), "stretch must be an array of numbers"),

@@ -196,6 +196,10 @@ def test_the_same_measurements_in_two_units_are_compared(fits):
     in_kpa = tq.Experiment("uniaxial", STRETCH, rounded, stress_unit="kPa")
     table = tq.compare({"MPa": fits["yeoh"], "kPa": tq.fit(in_kpa, discrepancy="yeoh", noise_sd=0.05)})
     assert table["probability"].to_numpy(float) == pytest.approx([0.5, 0.5], abs=0.01)
+    assert table.columns.name == "stresses in MPa"
+    of_kpa = tq.compare({"kPa": tq.fit(in_kpa, discrepancy="yeoh", noise_sd=0.05), "MPa": fits["yeoh"]})
+    assert of_kpa.columns.name == "stresses in kPa"  # as of the summary, of the first
+    assert of_kpa["median"].to_numpy(float) == pytest.approx(1e3 * table["median"].to_numpy(float), rel=1e-3)
     other = np.array(rounded) / 1e3
     other[5] += 0.001 * other.max()
     changed = tq.fit(tq.Experiment("uniaxial", STRETCH, other), discrepancy="none", noise_sd=0.05)

@@ -16,7 +16,7 @@ KPA = StressUnit("kPa", 1e-3)
 @pytest.fixture(scope="module")
 def table(specimen_study):
     names = ("none", "constant", "yeoh", "auto")
-    return tq.compare({name: specimen_study.posteriors[name] for name in names})
+    return tq.compare({name: specimen_study.posteriors[name] for name in names}, unit="MPa")
 
 
 def test_every_fit_is_a_row_and_the_parameter_is_in_the_unit_asked_for(table):

@@ -197,7 +197,7 @@ EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
 
 
-def compare(fits: Mapping[str, Any] | Sequence[Any], unit: str = "MPa") -> pd.DataFrame:
+def compare(fits: Mapping[str, Any] | Sequence[Any], unit: str | None = None) -> pd.DataFrame:
     """Return fits of the same measurements side by side, that with the most evidence first.
 
     Parameters
@@ -205,8 +205,9 @@ def compare(fits: Mapping[str, Any] | Sequence[Any], unit: str = "MPa") -> pd.Da
     fits : mapping of str to Posterior or xarray.DataTree, or sequence of these
         By name, those of a sequence named by material and discrepancy; trees are those of `Posterior.data`, as saved
         files hold them.
-    unit : str
-        Of stress, such as ``"kPa"``; it stands at the head of the columns.
+    unit : str, optional
+        Of stress, such as ``"MPa"``; that of the measurements of the first, unless given. It stands at the head of the
+        columns.
 
     Returns
     -------
@@ -273,7 +274,8 @@ def compare(fits: Mapping[str, Any] | Sequence[Any], unit: str = "MPa") -> pd.Da
         list(trees),
     )
     ordered = table.sort_values(["log_evidence", "elpd"], ascending=False)
-    return in_unit(ordered, ["median", "hdi_low", "hdi_high"], unit)
+    measured = next(iter(trees.values()))["observed_data"]["stress"].attrs.get("units", "MPa")
+    return in_unit(ordered, ["median", "hdi_low", "hdi_high"], unit or measured)
 
 
 def _tree(fit: Any) -> xr.DataTree:

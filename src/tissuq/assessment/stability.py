@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from tissuq.arrays import BoolArray, FloatArray, IndexArray
 from tissuq.errors import InputError, ModelError
+from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import ImposedStretches, LoadingMode, States, curve_modes, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -21,6 +22,7 @@ from tissuq.mechanics.invariants import MeasuredStates, farthest_stretch
 from tissuq.mechanics.rays import through
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.checks import check_count
 from tissuq.prediction.moments import drawn_curves
 
 Curves = Callable[[States], FloatArray]
@@ -145,8 +147,9 @@ def stability_over(
     if len(loading.controls) > 1:
         raise InputError(f"stability is computed in modes of one control, and '{loading.name}' has several.")
     if stretch is None:
+        check_count(points, "points must be one or more")
         stretch = np.linspace(*measured_range(data, loading), points)
-    return stability(solution, loading, np.atleast_1d(np.asarray(stretch, dtype=float)))
+    return stability(solution, loading, checked_points(loading, np.atleast_1d(stretch)))
 
 
 def stable_ranges(solution: Solution, reach: float = 1.0) -> dict[str, StableRange]:

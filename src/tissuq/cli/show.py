@@ -127,7 +127,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
         step("reading")
         trees = _trees(runs)
         step("comparing")
-        table = compare_fits(trees)
+        table = compare_fits(trees, unit="MPa")
     units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
     measured = values_in_mpa(next(iter(trees.values()))["observed_data"]["stress"])
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa").readable(float(abs(measured).max()))

@@ -15,7 +15,7 @@ from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
 from tissuq.emulation.runs import ForwardRuns, PointSet, space_filling
 from tissuq.errors import InputError
-from tissuq.parameters.checks import check_seed
+from tissuq.parameters.checks import check_count, check_seed
 
 Runner = Callable[[FloatArray], ForwardRuns]
 """A function that runs a forward model at parameters (N, d)."""
@@ -50,8 +50,8 @@ class EmulationSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.refine < 0:
-            raise InputError(f"the number of further runs must be 0 or more, not {self.refine}.")
+        check_count(self.runs, "the number of runs must be 1 or more")
+        check_count(self.refine, "the number of further runs must be 0 or more", least=0)
         check_seed(self.seed)
 
 
@@ -138,6 +138,8 @@ def _check_run_count(problem: Problem, settings: EmulationSettings) -> None:
 
 def _check_fit(problem: Problem, emulator: Emulator) -> None:
     """Refuse an emulator of other parameters or controls; one of a narrower region than the priors gives a warning."""
+    if not isinstance(emulator, Emulator):
+        raise InputError(f"emulator must be that of an earlier calibration, not {emulator!r:.80}.")
     if emulator.symbols != problem.forward_symbols:
         raise InputError(
             f"the emulator is one of {', '.join(emulator.symbols)}; the priors are of "

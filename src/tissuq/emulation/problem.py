@@ -76,6 +76,10 @@ def correlated(priors: Mapping[str, Prior], correlations: Mapping[tuple[str, str
     """
     if not correlations:
         return None
+    if not isinstance(correlations, Mapping):
+        raise InputError(
+            f"correlations must be by pairs of parameters, such as {{('mu', 'b'): 0.5}}, not {correlations!r}."
+        )
     symbols, matrix = list(priors), np.eye(len(priors))
     for pair, value in correlations.items():
         unknown = [symbol for symbol in pair if symbol not in priors]
@@ -310,8 +314,8 @@ def _discrepancy(discrepancy: str | Discrepancy, zero_load: float) -> Discrepanc
             f"discrepancy '{name}' cannot be used with a forward model, of which only the outputs are known: choose "
             f"one of {', '.join(DISCREPANCIES)}."
         )
-    if not isfinite(zero_load):
-        raise InputError(f"the control at zero load must be a finite number, not {zero_load}.")
+    if not isinstance(zero_load, Real) or not isfinite(zero_load):
+        raise InputError(f"the control at zero load must be a finite number, not {zero_load!r}.")
     if name == PinnedProcess.name:
         return PinnedProcess(references=(float(zero_load),))
     return DISCREPANCIES[name]()

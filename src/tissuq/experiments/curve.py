@@ -78,6 +78,7 @@ class Curve:
         for label in ("name", "source", "specimen", "direction", "condition"):
             if not isinstance(text := getattr(self, label), str):
                 raise InputError(f"{label} must be a text, such as '{text}', not {text!r:.80}.")
+        stress_unit(self.stress_unit)  # which refuses what is none
 
     def __len__(self) -> int:
         return len(self.stress)

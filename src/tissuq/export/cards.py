@@ -6,6 +6,8 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import inf
+from numbers import Real
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.units import stress_unit
 from tissuq.export.states import SeenStates
+from tissuq.parameters.checks import check_count
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.registry import find, variants
 
@@ -35,6 +38,11 @@ DEFAULT_BULK_TO_SHEAR = 1000.0
 
 NEARLY = 20.0
 """Bulk modulus over the initial shear modulus below which the volume changes notably: Poisson's ratio of 0.475."""
+
+
+def _is_between(value: object, high: float) -> bool:
+    """Return whether a value is a number above zero and below another one."""
+    return isinstance(value, Real) and 0 < float(value) < high
 
 
 @dataclass(frozen=True)
@@ -82,14 +90,13 @@ class CardSettings:
             raise InputError(f"the unit of a model must be one of {', '.join(UNITS)}, not '{self.unit}'.")
         if self.bulk_modulus is not None and self.poisson is not None:
             raise InputError("give the bulk modulus or Poisson's ratio, not both.")
-        if self.bulk_modulus is not None and not 0 < self.bulk_modulus < float("inf"):
-            raise InputError(f"a bulk modulus must be positive, not {self.bulk_modulus:g}.")
-        if self.poisson is not None and not 0 < self.poisson < 0.5:
-            raise InputError(f"Poisson's ratio must lie between 0 and 0.5, not at {self.poisson:g}.")
+        if self.bulk_modulus is not None and not _is_between(self.bulk_modulus, inf):
+            raise InputError(f"a bulk modulus must be positive, not {self.bulk_modulus!r}.")
+        if self.poisson is not None and not _is_between(self.poisson, 0.5):
+            raise InputError(f"Poisson's ratio must lie between 0 and 0.5, not at {self.poisson!r}.")
         if self.order is not None and self.law is None:
             raise InputError("the order belongs to a law: give the law as well, such as polynomial or ogden.")
-        if self.number < 1:
-            raise InputError(f"the number of a material in a model is 1 or more, not {self.number}.")
+        check_count(self.number, "the number of a material in a model is 1 or more")
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", self.name):
             raise InputError(
                 f"'{self.name}' cannot name a material: use up to 40 letters, digits, _ and -, a letter first."

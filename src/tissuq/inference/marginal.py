@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.arrays import FloatArray, IndexArray
+from tissuq.errors import InputError
+from tissuq.parameters.checks import check_probability
 
 TABLE_POINTS = 1001
 """In a table that is smoothed from many values."""
@@ -26,6 +28,8 @@ NEGLIGIBLE = 1e-9
 """Probability at either end that is left out of the table of weighted points that lie far apart."""
 MANY_AT_END = 10
 """Effective points that a bandwidth holds at the last density of points, if it is cut there; of tails about one."""
+ROUNDING = 1e-9
+"""By which a probability that is computed may be below zero or above one."""
 LOG_BINS = 10_000
 """In which the logarithms of many values are sorted."""
 
@@ -64,10 +68,14 @@ class Marginal:
 
     def quantile(self, probability: ArrayLike) -> FloatArray:
         """Return the values below which the given probabilities lie."""
-        return np.asarray(np.interp(np.asarray(probability), self.cumulative, self.points))
+        asked = np.asarray(probability, dtype=np.float64)
+        if asked.size and not -ROUNDING < asked.min() <= asked.max() < 1 + ROUNDING:
+            raise InputError(f"probabilities must be from 0 to 1, not {probability!r:.80}.")
+        return np.asarray(np.interp(asked, self.cumulative, self.points))
 
     def hdi(self, prob: float = 0.95) -> tuple[float, float]:
         """Return the shortest interval that holds ``prob`` of the posterior (95 % HPD for 0.95)."""
+        check_probability(prob)
         start = np.linspace(0.0, 1.0 - prob, HDI_STARTS)
         best = int((self.quantile(start + prob) - self.quantile(start)).argmin())
         low, high = start[max(best - 2, 0)], start[min(best + 2, HDI_STARTS - 1)]

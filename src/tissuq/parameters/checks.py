@@ -25,15 +25,15 @@ def check_seed(seed: object) -> None:
         raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, not {seed!r}.")
 
 
-def check_count(count: object, rule: str) -> None:
-    """Refuse what is no whole number, one or more, with the rule that it breaks.
+def check_count(count: object, rule: str, least: int = 1) -> None:
+    """Refuse what is no whole number, one or more unless another one is the least, with the rule that it breaks.
 
     Raises
     ------
     InputError
         When it is none.
     """
-    if not isinstance(count, Integral) or isinstance(count, bool) or count < 1:
+    if not isinstance(count, Integral) or isinstance(count, bool) or count < least:
         raise InputError(f"{rule}, not {count!r:.80}.")
 
 

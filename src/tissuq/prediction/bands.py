@@ -306,7 +306,7 @@ def asked_for(
     points = checked_points(loading, np.atleast_1d(stretch))
     check_probability(prob)
     check_switches(discrepancy=discrepancy)
-    if not 0 <= channel < len(loading.stresses):
+    if channel not in range(len(loading.stresses)):
         raise InputError(f"mode '{loading.name}' has the stresses {', '.join(loading.stresses)}: no number {channel}.")
     for solution in solutions:
         if problem := why_no_equilibrium(solution.model.material, loading.paths[channel].moved(points[:1], 0.0)):

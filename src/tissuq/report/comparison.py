@@ -86,7 +86,7 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
     Parameters
     ----------
     table : pandas.DataFrame
-        From `tissuq.compare`.
+        From `tissuq.compare`, in MPa.
     unit : StressUnit
         Of the parameter's axis.
     """
@@ -123,7 +123,7 @@ def comparison_result(table: pd.DataFrame, runs: list[str], unit: StressUnit) ->
     Parameters
     ----------
     table : pandas.DataFrame
-        From `tissuq.compare`.
+        From `tissuq.compare`, in MPa.
     runs : list of str
         What was compared, as it was named.
     unit : StressUnit

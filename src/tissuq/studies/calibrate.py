@@ -26,6 +26,7 @@ from tissuq.emulation.problem import Problem, pose
 from tissuq.emulation.runs import FIRST_RUNS, ForwardRun, ForwardRuns, carry_out, check_first_runs, gathered
 from tissuq.errors import InputError
 from tissuq.model.discrepancy import Discrepancy
+from tissuq.parameters.checks import check_count, checked_path
 from tissuq.parameters.priors import Prior
 from tissuq.studies.stream import (
     RESULTS,
@@ -167,12 +168,11 @@ def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers
     InputError
         When the folder holds runs of another model or at other controls, or the model cannot travel to processes.
     """
-    if workers < 1:
-        raise InputError(f"the number of workers must be at least 1, not {workers}.")
+    check_count(workers, "the number of workers must be at least 1")
     if workers > 1:
         _check_travels(model)
     with TemporaryDirectory() as scratch, open_pool(workers) as pool:
-        runs_folder = Path(scratch) if folder is None else Path(folder)
+        runs_folder = Path(scratch) if folder is None else checked_path(folder, "a folder")
         missing = [path for path in (runs_folder, *runs_folder.absolute().parents) if not path.exists()]
         if folder is not None:
             _open(runs_folder, model, problem)
