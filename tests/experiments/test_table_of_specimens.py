@@ -119,6 +119,9 @@ def test_an_option_takes_the_place_of_the_size_in_the_table(laboratory):
     said = done_in(laboratory, "inspect", file, "--sizes", table, "--length", "40 mm").out
     assert "40 mm (length as given)" in said
     assert "31.62 mm2" in said
+    said = done_in(laboratory, "inspect", file, "--sizes", table, "--area", "30 mm2").out
+    assert "30 mm2 (as given)" in said
+    assert "20 mm (length as given)" in said
 
 
 def test_a_population_takes_the_sizes_of_its_specimens_and_is_repeated_with_them(laboratory, tmp_path):
@@ -134,7 +137,7 @@ def test_specimens_in_a_column_have_the_sizes_of_their_rows(laboratory, tmp_path
     stretch, sizes = np.linspace(1.0, 1.3, 20), tq.read_sizes(laboratory / "sizes.csv")
     lines = [f"{name},{row}" for name in SIZES for row in rows_of(name, stretch)]
     file = write(tmp_path / "all.csv", "sample,displacement [mm],force [N]", *lines)
-    for name, (reading,) in read_column(file, "sample", lambda names: sizes[names[0]]).items():
+    for name, (reading,) in read_column(file, "sample", sizes.get).items():
         check_stress(reading.experiment, name)
 
 

@@ -22,6 +22,8 @@ OPTIONAL_FOR_TESTS = ("dimensions", "compression_positive")
 """Options that a test does without where another one needs them: an error where none does."""
 SELECTION = ("sheet", "table", "columns", "only", *OPTIONAL_FOR_TESTS)
 """Options that differ between the tests in a file: where each is, and what not all need."""
+SECTIONS = frozenset(["area", "width", "diameter"])
+"""Dimensions that say the cross-section, of which one is given."""
 HEAD = """\
 # What was understood of these tests. Change what is wrong, then: tissuq fit FILE.toml
 # The options of every test are those of reading (tissuq inspect --help); lines that begin with a # are remarks.
@@ -167,7 +169,7 @@ def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) ->
         elif any(has(other, role, name) for other in files for name in names):
             del columns[role]
     others = {name: value for name, value in reading.items() if name != "sizes"}
-    dimensions = {**dimensions_in(reading.get("sizes"), names_of(file), str(file)), **(reading.get("dimensions") or {})}
+    dimensions = dimensions_in(reading.get("sizes"), names_of(file), str(file), reading.get("dimensions") or {})
     return {**others, "columns": columns or None, "dimensions": dimensions or None}
 
 
@@ -178,8 +180,10 @@ def names_of(file: Path) -> list[str]:
     return [name for name in (test, path.name, path.stem, path.resolve().parent.name) if name]
 
 
-def dimensions_in(sizes: Path | str | None, names: Collection[str], file: str) -> Mapping[str, str]:
-    """Return the dimensions of the specimen with one of some names in a table of sizes; none without a table.
+def dimensions_in(
+    sizes: Path | str | None, names: Collection[str], file: str, given: Mapping[str, str]
+) -> Mapping[str, str]:
+    """Return the dimensions of the specimen with one of some names in a table of sizes, if any, but for those given.
 
     Raises
     ------
@@ -187,10 +191,12 @@ def dimensions_in(sizes: Path | str | None, names: Collection[str], file: str) -
         When the table cannot be read, or has no row for it.
     """
     if sizes is None:
-        return {}
+        return given
     from tissuq.experiments.reading.table_of_specimens import dimensions_from, read_sizes
 
-    return dimensions_from(read_sizes(sizes), names, str(sizes), file)
+    of_table = dimensions_from(read_sizes(sizes), names, str(sizes), file)
+    replaced = SECTIONS if SECTIONS & given.keys() else frozenset()
+    return {**{name: size for name, size in of_table.items() if name not in replaced}, **given}
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

@@ -310,14 +310,14 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         if self.specimen is not None:
             (file,) = next(iter(sources.values()))
 
-            def dimensions_of(names: Collection[str]) -> Mapping[str, str]:
-                return dimensions_in(sizes, names, ", ".join(names))
+            def dimensions_of(specimen: str) -> Mapping[str, str]:
+                return dimensions_in(sizes, [specimen], specimen, self.dimensions)
 
             return read_column(file, self.specimen, dimensions_of, **options)
         tests_of = dict[str, list[TestInFile]]()
         for name, files in sources.items():
             for file in files:
-                dimensions = {**dimensions_in(sizes, [*names_of(file), name], str(file)), **self.dimensions}
+                dimensions = dimensions_in(sizes, [*names_of(file), name], str(file), self.dimensions)
                 of_file: ReadingOptions = {**options, "dimensions": dimensions}
                 tests_of.setdefault(name, []).extend(
                     find_tests_in_file(file, is_one_of_several=len(files) > 1, **of_file)

@@ -58,7 +58,7 @@ def find_tests(
 def read_column(
     path: str | os.PathLike[str],
     specimen: str | int,
-    dimensions_of: Callable[[Collection[str]], Mapping[str, str]] = lambda names: {},
+    dimensions_of: Callable[[str], Mapping[str, str]] | None = None,
     **options: Unpack[ReadingOptions],
 ) -> dict[str, list[Reading]]:
     """Return what is read of the tests of each specimen that a column of one file names, in the order of the file.
@@ -68,8 +68,8 @@ def read_column(
     path : str or path
     specimen : str or int
         Name, or number from 1, of the column.
-    dimensions_of : callable
-        Returns the dimensions of the specimen that has one of some names, where they are not in ``options``.
+    dimensions_of : callable, optional
+        Returns the dimensions of a specimen by its name; those in ``options`` unless given.
     options
         As for `tissuq.read_experiment`.
     """
@@ -82,11 +82,9 @@ def read_column(
         raise InputError(f"{table.place(column, row)}: the name of the specimen is missing.")
     readings = {}
     for label in dict.fromkeys(labels.tolist()):
-        of_label: ReadingOptions = {
-            **options,
-            "only": {**only, table.key(column): label},
-            "dimensions": {**dimensions_of([label]), **(options.get("dimensions") or {})},
-        }
+        of_label: ReadingOptions = {**options, "only": {**only, table.key(column): label}}
+        if dimensions_of is not None:
+            of_label["dimensions"] = dimensions_of(label)
         tests = find_tests_in_file(path, is_one_of_several=True, **of_label)
         readings[label] = [of_specimen(test.reading, label) for test in tests]
     return readings
