@@ -108,7 +108,7 @@ def test_a_missing_amplitude_does_not_bring_in_the_unit_of_stress():
 
 @pytest.mark.parametrize(
     ("prior", "likelihood", "words"),
-    [(0.01, 0.1, "data determine"), (0.2, 0.01, "priors influence"), (0.2, 0.3, "contradict"), (0.0, 0.0, "neither")],
+    [(0.01, 0.1, "is from the data"), (0.2, 0.01, "priors influence"), (0.2, 0.3, "contradict"), (0.0, 0.0, "neither")],
 )
 def test_the_diagnosis_is_a_sentence(prior, likelihood, words):
     text = sensitivity.PowerScaling(prior, likelihood).sentence("C10")

@@ -39,7 +39,7 @@ class PowerScaling:
         if self.prior < MIN_SENSITIVITY:
             if self.likelihood < MIN_SENSITIVITY:
                 return f"neither the priors nor the data have much influence on {parameter} ({numbers})"
-            return f"the data determine {parameter}, the shapes of the priors have little influence ({numbers})"
+            return f"what is known of {parameter} is from the data, not from the shapes of the priors ({numbers})"
         if self.likelihood < MIN_SENSITIVITY:
             return (
                 f"the priors influence {parameter} more than the data do ({numbers}): measure more, or justify the "
