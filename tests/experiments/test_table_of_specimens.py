@@ -10,6 +10,7 @@ import pytest
 import tissuq as tq
 from command_line import done_in, run_in
 from tissuq.experiments.reading.specimens_in_files import read_column
+from tissuq.experiments.reading.table_of_specimens import TableOfSizes
 
 SIZES = {"A": (20.0, 10.2, 3.1), "B": (21.5, 9.8, 2.9), "C": (19.2, 10.0, 3.3)}
 """Length, width and thickness of the specimens, mm."""
@@ -134,10 +135,10 @@ def test_a_population_takes_the_sizes_of_its_specimens_and_is_repeated_with_them
 
 
 def test_specimens_in_a_column_have_the_sizes_of_their_rows(laboratory, tmp_path):
-    stretch, sizes = np.linspace(1.0, 1.3, 20), tq.read_sizes(laboratory / "sizes.csv")
+    stretch = np.linspace(1.0, 1.3, 20)
     lines = [f"{name},{row}" for name in SIZES for row in rows_of(name, stretch)]
     file = write(tmp_path / "all.csv", "sample,displacement [mm],force [N]", *lines)
-    for name, (reading,) in read_column(file, "sample", sizes.get).items():
+    for name, (reading,) in read_column(file, "sample", TableOfSizes.read(laboratory / "sizes.csv")).items():
         check_stress(reading.experiment, name)
 
 

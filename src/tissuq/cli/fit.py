@@ -43,6 +43,7 @@ class FitOptions(Written):
 def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
     from tissuq.experiments.experiment import Experiment
+    from tissuq.experiments.reading.table_of_specimens import TableOfSizes
     from tissuq.mechanics import material_named
     from tissuq.studies.specimen import priors_in_mpa
 
@@ -57,7 +58,7 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
         _check_once(call.how, modes, noise, axial_stretches)
         read_as |= {"mode": modes[0]} if modes else {}
         read_as |= {"axial_stretch": axial_stretches[0]} if axial_stretches else {}
-    read_as |= {"sizes": call.how.sizes} if call.how.sizes else {}
+    read_as |= {"sizes": TableOfSizes.read(call.how.sizes)} if call.how.sizes else {}
     of_files = [] if call.config else files
     of_tests, read_tests = measured(of_files, read_as, modes, call.how.specimen, noise, axial_stretches, print)
     if not (paths or call.config):

@@ -51,6 +51,7 @@ class InspectOptions(IntoFolder):
 def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     """Show what is understood of files of measurements: tests, columns, dimensions, cycles, rows, noise, warnings."""
     from tissuq.experiments.reading.inspection import Inspection, overview
+    from tissuq.experiments.reading.table_of_specimens import TableOfSizes
     from tissuq.report.run_folder import run_folder
     from tissuq.studies.files_of_tests import study_file
 
@@ -62,7 +63,8 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     if write is not None and write.exists() and not force:
         raise InputError(f"'{write}' exists. Give another name, or --force to replace it.")
     settings: dict[str, Any] = dict(call.stated)
-    files = files_of(settings.pop("file"), settings.get("sizes"))
+    files = files_of(settings.pop("file"), sizes := settings.pop("sizes", None))
+    settings |= {"sizes": TableOfSizes.read(sizes)} if sizes else {}
     tests: list[tuple[dict[str, Any], Reading]] = []
     for path in files:
         if ask:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -22,8 +22,6 @@ OPTIONAL_FOR_TESTS = ("dimensions", "compression_positive")
 """Options that a test does without where another one needs them: an error where none does."""
 SELECTION = ("sheet", "table", "columns", "only", *OPTIONAL_FOR_TESTS)
 """Options that differ between the tests in a file: where each is, and what not all need."""
-SECTIONS = frozenset(["area", "width", "diameter"])
-"""Dimensions that say the cross-section, of which one is given."""
 HEAD = """\
 # What was understood of these tests. Change what is wrong, then: tissuq fit FILE.toml
 # The options of every test are those of reading (tissuq inspect --help); lines that begin with a # are remarks.
@@ -169,8 +167,9 @@ def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) ->
         elif any(has(other, role, name) for other in files for name in names):
             del columns[role]
     others = {name: value for name, value in reading.items() if name != "sizes"}
-    dimensions = dimensions_in(reading.get("sizes"), names_of(file), str(file), reading.get("dimensions") or {})
-    return {**others, "columns": columns or None, "dimensions": dimensions or None}
+    if sizes := reading.get("sizes"):
+        others["dimensions"] = sizes.dimensions(names_of(file), str(file), reading.get("dimensions"))
+    return {**others, "columns": columns or None}
 
 
 def names_of(file: Path) -> list[str]:
@@ -178,25 +177,6 @@ def names_of(file: Path) -> list[str]:
     name, _, test = (str(file), "", "") if file.exists() else str(file).partition("#")
     path = Path(name)
     return [name for name in (test, path.name, path.stem, path.resolve().parent.name) if name]
-
-
-def dimensions_in(
-    sizes: Path | str | None, names: Collection[str], file: str, given: Mapping[str, str]
-) -> Mapping[str, str]:
-    """Return the dimensions of the specimen with one of some names in a table of sizes, if any, but for those given.
-
-    Raises
-    ------
-    InputError
-        When the table cannot be read, or has no row for it.
-    """
-    if sizes is None:
-        return given
-    from tissuq.experiments.reading.table_of_specimens import dimensions_from, read_sizes
-
-    of_table = dimensions_from(read_sizes(sizes), names, str(sizes), file)
-    replaced = SECTIONS if SECTIONS & given.keys() else frozenset()
-    return {**{name: size for name, size in of_table.items() if name not in replaced}, **given}
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

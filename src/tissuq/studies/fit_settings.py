@@ -302,23 +302,21 @@ class PopulationSettings(FittedSettings, ReadingSettings):
 
     def _all_readings(self, folder: Path) -> dict[str, list[Reading]]:
         from tissuq.experiments.reading.specimens_in_files import of_specimen, read_column
+        from tissuq.experiments.reading.table_of_specimens import TableOfSizes
         from tissuq.experiments.reading.tests_in_file import TestInFile, find_tests_in_file
-        from tissuq.studies.files_of_tests import dimensions_in, names_of
+        from tissuq.studies.files_of_tests import names_of
 
-        sources, sizes = self.sources(folder), self.sizes and folder / self.sizes
-        options = self.reading_options
+        sources, options = self.sources(folder), self.reading_options
+        sizes = None if self.sizes is None else TableOfSizes.read(folder / self.sizes)
         if self.specimen is not None:
             (file,) = next(iter(sources.values()))
-
-            def dimensions_of(specimen: str) -> Mapping[str, str]:
-                return dimensions_in(sizes, [specimen], specimen, self.dimensions)
-
-            return read_column(file, self.specimen, dimensions_of, **options)
+            return read_column(file, self.specimen, sizes, **options)
         tests_of = dict[str, list[TestInFile]]()
         for name, files in sources.items():
             for file in files:
-                dimensions = dimensions_in(sizes, [*names_of(file), name], str(file), self.dimensions)
-                of_file: ReadingOptions = {**options, "dimensions": dimensions}
+                of_file: ReadingOptions = {**options}
+                if sizes is not None:
+                    of_file["dimensions"] = sizes.dimensions([*names_of(file), name], str(file), self.dimensions)
                 tests_of.setdefault(name, []).extend(
                     find_tests_in_file(file, is_one_of_several=len(files) > 1, **of_file)
                 )

@@ -22,6 +22,8 @@ HOW_TO_GIVE_SECTION = (
 )
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
+WAYS = frozenset(["area", "width", "diameter"])
+"""Dimensions that each say the cross-section in another way: one of them is given."""
 BREADTHS = ("diameter",), ("width", "thickness")
 """Sizes that say how broad a specimen is; an area alone tells it of a round one."""
 EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."

@@ -11,7 +11,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.numbers import number_and_unit
-from tissuq.experiments.reading.dimensions import SECTIONS, Dimension, Dimensions, agree, quantity_of, sections_of
+from tissuq.experiments.reading.dimensions import SECTIONS, WAYS, Dimension, Dimensions, agree, quantity_of, sections_of
 from tissuq.experiments.reading.headings import dimensions_named, heading, on_axis
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.side_by_side import TestBeside
@@ -59,7 +59,7 @@ def dimensions_of(
     unknown = [name for name in texts if name not in DIMENSION_NAMES]
     if unknown:
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
-    if len([name for name in ("area", "diameter", "width") if name in texts]) > 1:
+    if len(WAYS & texts.keys()) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
     every_size = stated_sizes(table, specimens, test)
     is_cylinder = "diameter" in texts or any(size.is_of("diameter", is_cylinder=False) for size in every_size)

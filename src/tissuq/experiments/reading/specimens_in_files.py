@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,7 @@ from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import only_rows, row_names
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.table_of_specimens import table_of_specimens
+from tissuq.experiments.reading.table_of_specimens import TableOfSizes, table_of_specimens
 from tissuq.experiments.reading.tables import read_table
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 
@@ -58,7 +58,7 @@ def find_tests(
 def read_column(
     path: str | os.PathLike[str],
     specimen: str | int,
-    dimensions_of: Callable[[str], Mapping[str, str]] | None = None,
+    sizes: TableOfSizes | None = None,
     **options: Unpack[ReadingOptions],
 ) -> dict[str, list[Reading]]:
     """Return what is read of the tests of each specimen that a column of one file names, in the order of the file.
@@ -68,8 +68,8 @@ def read_column(
     path : str or path
     specimen : str or int
         Name, or number from 1, of the column.
-    dimensions_of : callable, optional
-        Returns the dimensions of a specimen by its name; those in ``options`` unless given.
+    sizes : TableOfSizes, optional
+        Those of the specimens.
     options
         As for `tissuq.read_experiment`.
     """
@@ -83,8 +83,8 @@ def read_column(
     readings = {}
     for label in dict.fromkeys(labels.tolist()):
         of_label: ReadingOptions = {**options, "only": {**only, table.key(column): label}}
-        if dimensions_of is not None:
-            of_label["dimensions"] = dimensions_of(label)
+        if sizes is not None:
+            of_label["dimensions"] = sizes.dimensions([label], label, options.get("dimensions"))
         tests = find_tests_in_file(path, is_one_of_several=True, **of_label)
         readings[label] = [of_specimen(test.reading, label) for test in tests]
     return readings

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.dimensions import Dimension, agree, quantity_of, sections_of
+from tissuq.experiments.reading.dimensions import WAYS, Dimension, agree, quantity_of, sections_of
 from tissuq.experiments.reading.dimensions_of_table import statements_of_size
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, SUFFIXES, file_format
 from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, plain
@@ -104,10 +105,10 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     """
     table, labels = table_of_specimens(path, (), "sizes", EXAMPLE_OF_SIZES)
     headings = {column: heading(name) for column, name in enumerate(table.names) if column}
-    units = table.cells()[0]
-    first = 1 if is_units_row(units[1:]) else 0
+    rows = table.cells()
+    first = int(is_units_row(rows[0][1:]))
     if first:
-        headings = {column: Heading(name.quantity, units[column].strip("[]()")) for column, name in headings.items()}
+        headings = {column: Heading(name.quantity, rows[0][column].strip("[]()")) for column, name in headings.items()}
     of_sizes = {
         column: name
         for column, name in headings.items()
@@ -118,32 +119,47 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
             f"{path}: none of the columns {', '.join(map(repr, table.names))} is known as a size of specimens. Name "
             f"them as in '{EXAMPLE_OF_SIZES}'."
         )
-    return {label: _sizes_of_row(table, row, of_sizes) for row, label in enumerate(labels) if row >= first}
+    numbered_rows = list(enumerate(zip(labels, rows, strict=True)))[first:]
+    return {label: _sizes_of_row(table, row, cells, of_sizes) for row, (label, cells) in numbered_rows}
 
 
-def dimensions_from(
-    sizes: Mapping[str, Mapping[str, str]], names: Collection[str], table: str, file: str
-) -> Mapping[str, str]:
-    """Return the sizes of the specimen that has one of some names, in their order; capitals and blanks are the same.
+@dataclass(frozen=True)
+class TableOfSizes:
+    """The sizes of specimens in a file, as `read_sizes` returns them."""
 
-    Raises
-    ------
-    InputError
-        When none of the rows is of it.
-    """
-    by_name = {plain(name): dimensions for name, dimensions in sizes.items()}
-    for name in names:
-        if (dimensions := sizes.get(name, by_name.get(plain(name)))) is not None:
-            return dimensions
-    raise InputError(
-        f"{table} has no row for {file}: its rows are of {', '.join(sizes)}. Name the file, or its specimen, in the "
-        "first column."
-    )
+    file: str
+    sizes: Mapping[str, Mapping[str, str]]
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> TableOfSizes:
+        """Return those in a file."""
+        return cls(str(path), read_sizes(path))
+
+    def dimensions(self, names: Collection[str], test: str, given: Mapping[str, str] | None) -> Mapping[str, str]:
+        """Return those of the specimen of a test, and in place of them what is given.
+
+        It is the first that has one of some names; capitals and blanks are the same.
+
+        Raises
+        ------
+        InputError
+            When none of the rows is of it.
+        """
+        by_name = {plain(name): dimensions for name, dimensions in self.sizes.items()}
+        found = (self.sizes.get(name, by_name.get(plain(name))) for name in names)
+        of_table = next((dimensions for dimensions in found if dimensions is not None), None)
+        if of_table is None:
+            raise InputError(
+                f"{self.file} has no row for {test}: its rows are of {', '.join(self.sizes)}. Name the file, or its "
+                "specimen, in the first column."
+            )
+        replaced = WAYS if given and WAYS & given.keys() else frozenset()
+        return {**{name: size for name, size in of_table.items() if name not in replaced}, **(given or {})}
 
 
-def _sizes_of_row(table: Table, row: int, headings: Mapping[int, Heading]) -> dict[str, str]:
+def _sizes_of_row(table: Table, row: int, cells: Sequence[str], headings: Mapping[int, Heading]) -> dict[str, str]:
     """Return the sizes in a row as texts, the cross-section in one way; a height is a length where none is named so."""
-    cells, stated = table.cells()[row], list[StatedSize]()
+    stated = list[StatedSize]()
     for column, named in headings.items():
         if cells[column].lower() in MISSING:
             continue
@@ -168,5 +184,5 @@ def _sizes_of_row(table: Table, row: int, headings: Mapping[int, Heading]) -> di
     if any(not agree(section, sections[0]) for section in sections):
         listed = " and ".join(f"{section.value:.4g} mm2" for section in sections)
         raise InputError(f"{table.place(0, row)}: the cross-section is {listed}; leave one of them.")
-    unneeded = {"width", "diameter"} if "area" in sizes else set()
+    unneeded = WAYS - {"area"} if "area" in sizes else frozenset()
     return {name: f"{size.value!r} {quantity_of(name).unit}" for name, size in sizes.items() if name not in unneeded}
