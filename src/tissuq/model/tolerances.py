@@ -29,9 +29,8 @@ from tissuq.registry import find, variants
 CONTRADICTION_SPREAD = 0.3
 """Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
 has one of 0.42, as that of the moduli in shear and in tension or compression of 15 isotropic tissues."""
-AS_TESTED, SPECIMEN, TISSUE = "as-tested", "specimen", "tissue"
-NO_ERRORS = "none"
-"""Tolerances in one word, those of what was tested as it is."""
+AS_TESTED, SPECIMEN, TISSUE, NO_ERRORS = "as-tested", "specimen", "tissue", "none"
+"""What intervals are of; the last is another word for the first."""
 ONE_SPECIMEN, MEAN_OF_SPECIMENS = "this specimen", "the mean of the measured specimens"
 """Of what measurements are in words: with standard errors they are means of several specimens."""
 LABORATORY: Mapping[str, float] = MappingProxyType(
@@ -319,24 +318,6 @@ def _effect(error: MeasurementError, points: ErrorPoints) -> FloatArray:
             "number for each of them."
         )
     return effect
-
-
-def stated_tolerances(stated: Tolerances | Mapping[str, float | str] | str) -> Tolerances:
-    """Return tolerances as people state them: themselves, by an estimand, or by sizes without others.
-
-    Raises
-    ------
-    InputError
-        When they are none of these.
-    """
-    if isinstance(stated, Mapping):
-        return Tolerances(**stated)
-    if isinstance(stated, Tolerances | str):
-        return stated if isinstance(stated, Tolerances) else Tolerances(stated)
-    raise InputError(
-        "tolerances must be such as {'slack': 0.01} or tissuq.Tolerances(stress=0.1), or one of "
-        f"{', '.join(ESTIMANDS)}, not {stated!r}."
-    )
 
 
 BETWEEN_SPECIMENS = Tolerances(stress=ESTIMANDS[TISSUE].sizes["stress"])

@@ -17,14 +17,14 @@ from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, NoDiscrepancy, discrepancy_named
 from tissuq.model.noise import Noise
-from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances, stated_tolerances
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances
 from tissuq.parameters.checks import check_switches, one_or_several
 from tissuq.parameters.priors import Prior
 from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population
 from tissuq.population.shared_error import biased, shared_covariance
-from tissuq.posterior.fitting import fit_many
+from tissuq.posterior.fitting import fit_many, stated_tolerances
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Method
 

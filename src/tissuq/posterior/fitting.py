@@ -19,7 +19,7 @@ from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.model.tolerances import AS_TESTED, Tolerances, stated_tolerances
+from tissuq.model.tolerances import AS_TESTED, ESTIMANDS, Tolerances
 from tissuq.parameters.checks import check_priors, check_seed
 from tissuq.parameters.priors import Prior
 from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
@@ -255,3 +255,21 @@ def _refuse_several(material: Any, priors: Any, mode: Any) -> None:
             "mode is one for all tests that are read: give each its own in [tissuq.read(table, mode='uniaxial'), "
             "tissuq.read(other, mode='planar')]."
         )
+
+
+def stated_tolerances(stated: Tolerances | Mapping[str, float | str] | str) -> Tolerances:
+    """Return tolerances as people state them: themselves, by an estimand, or by sizes without others.
+
+    Raises
+    ------
+    InputError
+        When they are none of these.
+    """
+    if isinstance(stated, Mapping):
+        return Tolerances(**stated)
+    if isinstance(stated, Tolerances | str):
+        return stated if isinstance(stated, Tolerances) else Tolerances(stated)
+    raise InputError(
+        "tolerances must be such as {'slack': 0.01} or tissuq.Tolerances(stress=0.1), or one of "
+        f"{', '.join(ESTIMANDS)}, not {stated!r}."
+    )

@@ -314,11 +314,21 @@ def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tol
 
     The same where there are none, the noise is known or more than one number, or a discrepancy takes up such errors.
     """
-    has_errors = model.experiment.standard_error.any() and MeanError.name not in tolerances.stated
-    return tolerances.with_sizes(**{MeanError.name: 1.0}) if has_errors and takes_standard_errors(model) else tolerances
+    is_open = _has_standard_errors(model, tolerances) and _takes_standard_errors(model)
+    return tolerances.with_sizes(**{MeanError.name: 1.0}) if is_open else tolerances
 
 
-def takes_standard_errors(model: StatisticalModel) -> bool:
+def leaves_standard_errors_out(model: StatisticalModel) -> bool:
+    """Return whether standard errors of the data are left out because they do not go with noise or discrepancy."""
+    return _has_standard_errors(model, model.tolerances) and not _takes_standard_errors(model)
+
+
+def _has_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> bool:
+    """Return whether the data state standard errors of means, and nobody another size of these."""
+    return bool(model.experiment.standard_error.any()) and MeanError.name not in tolerances.stated
+
+
+def _takes_standard_errors(model: StatisticalModel) -> bool:
     """Return whether standard errors of means go with the noise and the discrepancy of a model."""
     return len(model.noise.parameters) == 1 and not (model.is_correlated or model.noise.shares_discrepancy)
 

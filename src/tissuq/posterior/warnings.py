@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from math import ceil, isfinite, log
 
 import numpy as np
@@ -12,18 +12,17 @@ from tissuq.arrays import BoolArray, FloatArray
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.measurements import falls, stresses_apart
 from tissuq.assessment.modulus import modulus, modulus_symbols
-from tissuq.assessment.sensitivity import MIN_SENSITIVITY, power_scaling
 from tissuq.assessment.separability import inseparable_parameters
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.experiments.experiment import labels_of_tests
 from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
-from tissuq.model.measurement_errors import MeanError, ScaleError, TestError
+from tissuq.model.measurement_errors import ScaleError, TestError
 from tissuq.model.noise import KnownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import ESTIMANDS
-from tissuq.parameters.priors import Interval, Uniform
-from tissuq.posterior.plug_in import takes_standard_errors
+from tissuq.posterior.plug_in import leaves_standard_errors_out
+from tissuq.posterior.prior_warnings import cut_by_prior, influence_of_priors, is_sharp, sharp_prior
 from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -39,11 +38,7 @@ MAX_RELATIVE_WIDTH = 1.0
 """Width of the headline parameter's 95 % interval, over its median, above which it is poorly determined."""
 MIN_STABLE_PROBABILITY = 0.5
 """Probability of stability over the measured range below which a simulation is likely to fail."""
-ONE_SD_EITHER_SIDE, SHARP = (0.16, 0.84), 2.0
-"""Probabilities between which a prior is twice as wide as its standard deviation; this over that of the error that all
-tests have in common, below which the prior is sharp."""
-MAX_DENSITY_AT_BOUND = 0.1
-"""Marginal density at a prior bound, over its largest value, above which the bound determines the result."""
+
 
 MAX_COMPONENTS, MAX_ARRAY_VALUES = 200, 4_000_000
 """Posterior components that the residuals are averaged over; array values (components x measurements) for them."""
@@ -108,7 +103,7 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
             "less well.",
             "stability-contradicted",
         )
-    if _leaves_standard_errors_out(solution.model):
+    if leaves_standard_errors_out(solution.model):
         yield ResultWarning(
             "the standard errors of the means that the data state are not in the intervals: fit with {noise} and "
             "{discrepancy}, which include them.",
@@ -156,7 +151,7 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
             f"numerical integration is inaccurate (error of the log evidence: {size}), and so are intervals. {remedy}",
             "inaccurate-integral",
         )
-    cut = list(_cut_by_prior(solution))
+    cut = list(cut_by_prior(solution))
     lag1, held = _lag1_correlation(solution), int(inside.sum())
     if between_tests := _tests_apart(solution):
         yield ResultWarning(between_tests, "tests-apart")
@@ -164,10 +159,10 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange], inside
         yield _correlated_residuals(solution.model, lag1)
     elif not cut and bdtr(held, len(inside), 0.95) < MAX_PROBABILITY_OF_MISSES:
         yield _missed_measurements(solution.model, f"{held} of {len(inside)}")
-    if words := _influence_of_priors(solution):
+    if words := influence_of_priors(solution):
         yield ResultWarning(words, "prior-dominates")
-    if sharp := [symbol for symbol in modulus_symbols(solution.model) if _is_sharp(solution, symbol)]:
-        yield _sharp_prior(solution.model, sharp)
+    if sharp := [symbol for symbol in modulus_symbols(solution.model) if is_sharp(solution, symbol)]:
+        yield sharp_prior(solution.model, sharp)
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
     if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
@@ -282,12 +277,6 @@ def _describing_discrepancy(model: StatisticalModel) -> str:
     return "gp-pinned" if model.derived_parameters else "auto"
 
 
-def _leaves_standard_errors_out(model: StatisticalModel) -> bool:
-    """Return whether standard errors of the data are left out because they do not go with noise or discrepancy."""
-    is_open = MeanError.name not in model.tolerances.stated and not takes_standard_errors(model)
-    return is_open and bool(model.experiment.standard_error.any())
-
-
 def _directions_of_one_fibre(model: StatisticalModel) -> str:
     """Return directions of tests with one stress along one axis, where they are several and the material has fibres."""
     curves = [curve for curve in model.experiment.curves if len(curve.mode.stresses) == 1 and curve.direction]
@@ -378,51 +367,3 @@ def _tests_apart(solution: Solution) -> str:
         f"spread of {100 * spread:.0f} % that {'tests of a specimen may have' if is_one_specimen else 'is assumed'}. "
         f"The interval may hold neither. {advice}"
     )
-
-
-def _influence_of_priors(solution: Solution) -> str:
-    """Return in words that priors which were given, no bounds alone, determine the modulus as much as the data do."""
-    model = solution.model
-    symbols = [symbol for symbol in modulus_symbols(model) if symbol in model.chosen_priors]
-    if all(isinstance(model.chosen_priors[symbol], Uniform) for symbol in symbols):
-        return ""
-    sensitivity = power_scaling(solution)
-    if sensitivity is None or sensitivity.prior < MIN_SENSITIVITY:
-        return ""
-    words = f"the prior that was given for {' and '.join(symbols)} determines the result "
-    if sensitivity.likelihood < MIN_SENSITIVITY:
-        return words + "more than the data do: without it the result would be another one, unless both agree."
-    return words + "as much as the data do, and the two may contradict each other: see what the data say without it."
-
-
-def _is_sharp(solution: Solution, symbol: str) -> bool:
-    """Return whether a prior that was given, no bounds alone, is as sharp as the error that all tests share."""
-    model = solution.model
-    prior = model.chosen_priors.get(symbol)
-    if prior is None or isinstance(prior, Interval):
-        return False
-    low, high = prior.quantile(np.array(ONE_SD_EITHER_SIDE))
-    error = model.common_error * abs(float(solution.marginals[symbol].quantile(0.5)))
-    return bool(0.5 * (high - low) < SHARP * error)
-
-
-def _sharp_prior(model: StatisticalModel, symbols: Sequence[str]) -> ResultWarning:
-    names = " and ".join(symbols)
-    return ResultWarning(
-        f"the prior that was given for {names} is weighed against the stress as measured, and the error that all tests "
-        f"have in common ({100 * model.common_error:.2g} %) is added afterwards: the interval is wider than prior and "
-        "data allow together, and may lie beside the prior. Fit without it, and weigh both by the inverse of their "
-        "variances.",
-        "sharp-prior",
-    )
-
-
-def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
-    """Yield the parameters whose posterior density is high at a bound that only the prior sets, and which bound."""
-    for parameter in solution.model.parameters:
-        marginal = solution.marginals[parameter.symbol]
-        ends = zip(("lower", "upper"), solution.model.priors[parameter.symbol].support, parameter.support, strict=True)
-        for name, bound, natural in ends:
-            inside = bound + (1e-3 if name == "lower" else -1e-3) * marginal.sd
-            if bound != natural and marginal.pdf(inside) > MAX_DENSITY_AT_BOUND * marginal.density.max():
-                yield parameter.symbol, name
