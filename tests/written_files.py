@@ -1,4 +1,4 @@
-"""Files of columns of numbers that tests of reading write, and what refusals of them say."""
+"""Files that tests of reading write, of lines or of columns of numbers, and what refusals of them say."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.read import read_experiment
 
 
+def text_file(path, *lines, encoding="utf-8"):
+    """Write lines into a file, and return it."""
+    path.write_text("\n".join(lines) + "\n", encoding=encoding)
+    return path
+
+
 def written(folder, head, *columns, separator=",", name="test.csv", form="{:.12g}".format, encoding="utf-8"):
     """Return a file of columns beneath lines of text, of which the last has the names of the columns."""
     rows = [separator.join(map(form, row)) for row in zip(*columns, strict=True)]
-    (folder / name).write_text("\n".join([head, *rows]) + "\n", encoding=encoding)
-    return folder / name
+    return text_file(folder / name, head, *rows, encoding=encoding)
 
 
 def by_name(folder, **columns):

@@ -6,6 +6,7 @@ from tissuq.errors import InputError
 from tissuq.experiments import datasets
 from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 from tissuq.experiments.units import stress_units_in
+from written_files import text_file
 
 ROWS = "0,0\n0.1,2\n0.2,5\n"
 
@@ -13,9 +14,7 @@ ROWS = "0,0\n0.1,2\n0.2,5\n"
 @pytest.fixture
 def written(tmp_path):
     def write(names, rows=ROWS):
-        path = tmp_path / "test.csv"
-        path.write_text(f"{names}\n{rows}")
-        return path
+        return text_file(tmp_path / "test.csv", f"{names}\n{rows}")
 
     return write
 

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from written_files import written
+from written_files import text_file, written
 
 STRETCH = np.linspace(1, 1.3, 50)
 SIZES = {"length": "10 mm", "area": "6 mm2"}
@@ -58,8 +58,7 @@ def test_an_extensometer_beside_the_machine_is_asked_about_in_each_of_several_te
     columns = (np.arange(50.0), 6 * neo_hookean(STRETCH), 10 * MACHINE_STRAIN * strain, 10 * strain)
     rows = [",".join([f'"{value:.9f}"' for value in row] * 2) for row in zip(*columns, strict=True)]
     heads = ['"Disc A",,,,"Disc B",,,', ",".join(['"Time","Force","Stroke","Ext.1"'] * 2)]
-    path = tmp_path / "several.csv"
-    path.write_text("\n".join([*heads, ",".join(['"sec","N","mm","mm"'] * 2), *rows]))
+    path = text_file(tmp_path / "several.csv", *heads, ",".join(['"sec","N","mm","mm"'] * 2), *rows)
     with pytest.raises(InputError, match=r'or --column displacement="Ext.1" --column force="Force"\.') as error:
         tq.read_tests(path, dimensions=SIZES)
     assert str(error.value).count("'Ext.1'") == 1

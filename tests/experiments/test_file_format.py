@@ -9,6 +9,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.reading import FileFormat
+from written_files import text_file
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +49,7 @@ def test_several_sheets_with_tables_must_be_chosen_from(file):
 
 
 def test_other_files_are_read_as_text(notebook, tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("stretch,stress_kPa\n1.0,0.0\n1.1,2.5\n")
+    path = text_file(tmp_path / "test.csv", "stretch,stress_kPa\n1.0,0.0\n1.1,2.5")
     assert len(tq.read_experiment(path)) == 2
 
 

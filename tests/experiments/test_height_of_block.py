@@ -10,6 +10,7 @@ import pytest
 import tissuq as tq
 from machine_files import MU, neo_hookean
 from tissuq.errors import InputError
+from written_files import written
 
 LENGTH, WIDTH, HEIGHT = 12.0, 10.0, 8.0
 SECTION = LENGTH * WIDTH
@@ -19,10 +20,8 @@ UNIAXIAL = {"mode": "uniaxial", "stretch": PRESSED, "stress": neo_hookean(PRESSE
 SIMPLE_SHEAR = {"mode": "simple-shear", "stretch": SHEARED, "stress": MU * SHEARED}
 
 
-def written(folder, head, moved, force, names="Displacement (mm),Force (N)"):
-    rows = [f"{u:.8g},{f:.8g}" for u, f in zip(moved, force, strict=True)]
-    (folder / "test.csv").write_text("\n".join([*head, names, *rows]) + "\n", encoding="utf-8")
-    return folder / "test.csv"
+def block(folder, head, moved, force, names="Displacement (mm),Force (N)"):
+    return written(folder, "\n".join([*head, names]), moved, force)
 
 
 def sides(height):
@@ -30,13 +29,13 @@ def sides(height):
 
 
 def pressed(folder, height, sign=1, head=("Test: compression",)):
-    return written(folder, [*sides(height), *head], sign * HEIGHT * (1 - PRESSED), -sign * SECTION * UNIAXIAL["stress"])
+    return block(folder, [*sides(height), *head], sign * HEIGHT * (1 - PRESSED), -sign * SECTION * UNIAXIAL["stress"])
 
 
 def sheared(folder, height):
     names = "Shear displacement (mm),Shear force (N)"
     head = [*sides(height), "Simple shear of muscle"]
-    return written(folder, head, HEIGHT * SHEARED, SECTION * SIMPLE_SHEAR["stress"], names)
+    return block(folder, head, HEIGHT * SHEARED, SECTION * SIMPLE_SHEAR["stress"], names)
 
 
 def check(path, mode, stretch, stress, **options):
@@ -105,5 +104,5 @@ def test_one_size_as_given_is_not_enough(tmp_path):
 def test_a_strip_that_is_pulled_keeps_its_length(tmp_path):
     stretch = np.linspace(1, 1.3, 40)
     head = ["Length: 12 mm", "Width: 10 mm", "Thickness: 8 mm"]
-    path = written(tmp_path, head, LENGTH * (stretch - 1), 80 * neo_hookean(stretch))
+    path = block(tmp_path, head, LENGTH * (stretch - 1), 80 * neo_hookean(stretch))
     check(path, "uniaxial", stretch, neo_hookean(stretch))

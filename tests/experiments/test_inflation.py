@@ -13,7 +13,7 @@ import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments.reading.tube import Tube
 from tissuq.experiments.units import PRESSURE, looks_like_unit
-from written_files import message
+from written_files import message, text_file, written
 
 MMHG = 133.322387415e-6  # MPa
 INNER, OUTER = 1.25, 1.5  # mm
@@ -83,13 +83,11 @@ def wall(ratio):
     return 1 / outer, outer
 
 
-def written(folder, names=NAMES, law=fung, pressure_to=1 / MMHG, diameter_to=1e3, inner=False):
+def artery(folder, names=NAMES, law=fung, pressure_to=1 / MMHG, diameter_to=1e3, inner=False):
     pressure = pressures(law, INNER, OUTER) * pressure_to
     radius = outer_radius(STRETCH, INNER, OUTER)
     diameter = 2 * (np.sqrt(radius**2 - OUTER**2 + INNER**2) if inner else radius) * diameter_to
-    rows = [f"{p:.10g},{d:.10g}" for p, d in zip(pressure, diameter, strict=True)]
-    (folder / "artery.csv").write_text("\n".join([names, *rows]) + "\n", encoding="utf-8")
-    return folder / "artery.csv"
+    return written(folder, names, pressure, diameter, name="artery.csv")
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -155,7 +153,7 @@ def test_noise_of_the_pressure_is_not_made_much_larger(law):
     ],
 )
 def test_pressure_and_diameter_are_recognised_and_converted(tmp_path, names, to_file, inner):
-    data = tq.read(written(tmp_path, names, fung, *to_file, inner), mode="planar", **SIZES)
+    data = tq.read(artery(tmp_path, names, fung, *to_file, inner), mode="planar", **SIZES)
     np.testing.assert_allclose(data.stretch, STRETCH, atol=1e-8)
     stress = fung(STRETCH) / STRETCH
     np.testing.assert_allclose(data.stress, stress, rtol=0, atol=0.005 * stress.max())
@@ -164,14 +162,14 @@ def test_pressure_and_diameter_are_recognised_and_converted(tmp_path, names, to_
 
 
 def test_columns_are_named_in_python(tmp_path):
-    file = written(tmp_path, "q1,q2")
+    file = artery(tmp_path, "q1,q2")
     options = {"pressure": "q1", "outer_diameter": 2, "force_unit": "mmHg", "displacement_unit": "um"}
     data = tq.read(file, mode="planar", **options, **SIZES)
-    np.testing.assert_array_equal(data.stress, tq.read(written(tmp_path), mode="planar", **SIZES).stress)
+    np.testing.assert_array_equal(data.stress, tq.read(artery(tmp_path), mode="planar", **SIZES).stress)
 
 
 def test_the_outer_diameter_goes_before_the_inner_one(tmp_path):
-    file = written(tmp_path, law=neo_hookean)
+    file = artery(tmp_path, law=neo_hookean)
     lines = file.read_text().splitlines()
     radius = np.sqrt(outer_radius(STRETCH, INNER, OUTER) ** 2 - OUTER**2 + INNER**2)
     both = [f"{line},{2e3 * r:.10g}" for line, r in zip(lines[1:], radius, strict=True)]
@@ -185,7 +183,7 @@ def test_the_outer_diameter_goes_before_the_inner_one(tmp_path):
 
 def test_the_modulus_of_a_tube_is_found(tmp_path):
     posterior = tq.fit(
-        written(tmp_path, law=neo_hookean),
+        artery(tmp_path, law=neo_hookean),
         mode="planar",
         noise_sd="0.1 kPa",
         discrepancy="none",
@@ -201,18 +199,18 @@ def test_units_of_pressure_are_those_of_pint(unit):
 
 
 def test_what_is_taken_of_the_tube_is_said(tmp_path):
-    notes = tq.inspect(written(tmp_path), mode="planar", **SIZES).warnings
+    notes = tq.inspect(artery(tmp_path), mode="planar", **SIZES).warnings
     assert any("taken as held at its undeformed length" in note for note in notes)
     assert not any("as thick as the radius" in note for note in notes)
-    thick = tq.inspect(written(tmp_path), mode="planar", diameter="3 mm", thickness="0.6 mm").warnings
+    thick = tq.inspect(artery(tmp_path), mode="planar", diameter="3 mm", thickness="0.6 mm").warnings
     assert any("as thick as the radius of its middle, beyond the 0.5" in note for note in thick)
 
 
 @pytest.mark.parametrize("diameter", ["2.9 mm", "3.1 mm"])
 def test_a_tube_that_is_not_as_wide_as_said_without_pressure_is_noted(tmp_path, diameter):
-    notes = tq.inspect(written(tmp_path), mode="planar", diameter=diameter, thickness="0.25 mm").warnings
+    notes = tq.inspect(artery(tmp_path), mode="planar", diameter=diameter, thickness="0.25 mm").warnings
     assert any("in line 2 the tube has hardly any pressure" in note for note in notes)
-    assert not any("hardly any" in note for note in tq.inspect(written(tmp_path), mode="planar", **SIZES).warnings)
+    assert not any("hardly any" in note for note in tq.inspect(artery(tmp_path), mode="planar", **SIZES).warnings)
 
 
 @pytest.mark.parametrize(
@@ -249,11 +247,11 @@ def test_a_tube_that_is_not_as_wide_as_said_without_pressure_is_noted(tmp_path, 
     ],
 )
 def test_what_is_missing_or_wrong_is_said(tmp_path, names, options, words):
-    assert words in message(written(tmp_path, names, neo_hookean), **options)
+    assert words in message(artery(tmp_path, names, neo_hookean), **options)
 
 
 def test_a_pressure_that_falls_as_the_tube_widens_is_refused(tmp_path):
-    file = written(tmp_path)
+    file = artery(tmp_path)
     head, *rows = file.read_text().splitlines()
     file.write_text("\n".join([head, *(f"-{row}" for row in rows)]))
     with pytest.raises(InputError, match="not wider where the pressure is larger"):
@@ -262,7 +260,7 @@ def test_a_pressure_that_falls_as_the_tube_widens_is_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["Axial stretch", "lambda_z", "Stretch z"])
 def test_a_tube_that_is_stretched_axially_is_refused_as_planar(tmp_path, name):
-    file = written(tmp_path)
+    file = artery(tmp_path)
     head, *rows = file.read_text().splitlines()
     file.write_text("\n".join([f"{head},{name}", *(f"{row},1.5" for row in rows)]))
     with pytest.raises(InputError, match=r"the axial stretch is 1\.5, and in loading mode 'planar' a tube keeps its"):
@@ -274,14 +272,13 @@ def test_a_tube_that_is_stretched_axially_is_refused_as_planar(tmp_path, name):
 def test_a_stress_goes_before_a_pressure_and_a_diameter(tmp_path):
     """As in a test in a bath whose pressure is recorded, with a specimen that becomes thinner."""
     rows = [f"{0.01 * k},{2.0 * k},{100 + 0.1 * k},{4 - 0.01 * k}" for k in range(30)]
-    file = tmp_path / "bath.csv"
-    file.write_text("\n".join(["Strain,Stress (kPa),Pressure (kPa),Diameter (mm)", *rows]))
+    file = text_file(tmp_path / "bath.csv", "Strain,Stress (kPa),Pressure (kPa),Diameter (mm)", *rows)
     assert tq.read(file).mode.name == "uniaxial"
 
 
 def test_options_for_means_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"not for the pressure in a tube"):
-        tq.read(written(tmp_path), mode="planar", mean_of=6, **SIZES)
+        tq.read(artery(tmp_path), mode="planar", mean_of=6, **SIZES)
 
 
 def test_a_curve_of_many_rows_is_fitted_to_some_of_them():

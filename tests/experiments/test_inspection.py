@@ -6,7 +6,7 @@ import pytest
 import tissuq as tq
 from machine_files import biotester, cycles, instron, neo_hookean, wintest
 from tissuq.experiments.reading.inspection import noise_between_neighbours
-from written_files import written
+from written_files import text_file, written
 
 
 @pytest.fixture
@@ -201,8 +201,7 @@ def test_compression_after_tension_from_the_reference_is_no_unloading(tmp_path):
     text = "stretch,stress_kPa\n"
     for end in (1.1, 0.9):
         text += "".join(f"{x:.5f},{1e3 * (x - x**-2):.6f}\n" for x in np.linspace(1, end, 17))
-    path = tmp_path / "both.csv"
-    path.write_text(text)
+    path = text_file(tmp_path / "both.csv", text)
     assert "loading and unloading differ" not in str(tq.inspect(path))
     down = np.linspace(1.1, 1, 17)[1:]
     path.write_text(

@@ -12,6 +12,7 @@ from machine_files import neo_hookean
 from tissuq.errors import InputError
 from tissuq.report.tables import write_csv
 from tissuq.report.writer import data_file
+from written_files import text_file
 
 STRETCH = np.linspace(1, 1.3, 20)
 FACTORS = {"longitudinal": 1.0, "transverse": 1.5}
@@ -21,15 +22,10 @@ def rows(factor, *cells):
     return [",".join([f"{x:.9f}", f"{1e3 * factor * neo_hookean(x):.9f}", *cells]) for x in STRETCH]
 
 
-def written(path, names, *lines):
-    path.write_text("\n".join([names, *lines]), encoding="utf-8")
-    return path
-
-
 @pytest.fixture
 def by_column(tmp_path):
     lines = [line for name, factor in FACTORS.items() for line in rows(factor, name, "frozen")]
-    return written(tmp_path / "aorta.csv", "stretch,stress [kPa],Fibre direction,Treatment", *lines)
+    return text_file(tmp_path / "aorta.csv", "stretch,stress [kPa],Fibre direction,Treatment", *lines)
 
 
 @pytest.fixture
@@ -68,7 +64,7 @@ def test_direction_and_condition_are_fields_that_choose_tests(request, source):
     ],
 )
 def test_words_in_the_name_of_a_file_say_them(tmp_path, name, labels):
-    path = written(tmp_path / name, "stretch,stress [kPa]", *rows(1.0))
+    path = text_file(tmp_path / name, "stretch,stress [kPa]", *rows(1.0))
     data = tq.read(path, mode="uniaxial")
     assert (data.direction, data.condition) == labels
     if labels[0]:
@@ -82,9 +78,8 @@ def test_words_in_the_name_of_a_file_say_them(tmp_path, name, labels):
     "line", ["Axial pre-stretch ratio 150%", "Axial stretch (lambda_z): 1.5", "axial strain = 50 %"]
 )
 def test_an_axial_stretch_above_the_table_is_no_direction(tmp_path, line):
-    data = tq.read(written(tmp_path / "test.csv", "stretch,stress (kPa)", *rows(1.0)))
-    above = tmp_path / "above.csv"
-    above.write_text(f"{line}\n{(tmp_path / 'test.csv').read_text(encoding='utf-8')}", encoding="utf-8")
+    data = tq.read(text_file(tmp_path / "test.csv", "stretch,stress (kPa)", *rows(1.0)))
+    above = text_file(tmp_path / "above.csv", f"{line}\n{(tmp_path / 'test.csv').read_text(encoding='utf-8')}")
     assert (tq.read(above).direction, data.direction) == ("", "")
     above.write_text(above.read_text(encoding="utf-8").replace(line, "Axial strip 3"), encoding="utf-8")
     assert tq.read(above).direction == "axial"
@@ -121,8 +116,8 @@ def test_they_may_be_said_of_what_is_measured():
 def test_a_line_above_the_table_names_the_specimen_as_a_column_does(tmp_path, line):
     separator = ";" if ";A12" in line else "\t" if "\t" in line else ","
     lines = [row.replace(",", separator) for row in ["stretch,stress [kPa]", *rows(1)]]
-    above = written(tmp_path / "above.csv", line, *lines)
-    column = written(tmp_path / "column.csv", "stretch,stress [kPa],Specimen", *rows(1, "A12"))
+    above = text_file(tmp_path / "above.csv", line, *lines)
+    column = text_file(tmp_path / "column.csv", "stretch,stress [kPa],Specimen", *rows(1, "A12"))
     assert [tq.read(file).specimen for file in (above, column)] == ["A12", "A12"]
     assert "specimen A12" in str(tq.inspect(above))
 
@@ -139,4 +134,4 @@ def test_a_line_above_the_table_names_the_specimen_as_a_column_does(tmp_path, li
     ],
 )
 def test_numbers_materials_and_several_specimens_name_none(tmp_path, line):
-    assert tq.read(written(tmp_path / "above.csv", line, "stretch,stress [kPa]", *rows(1))).specimen == ""
+    assert tq.read(text_file(tmp_path / "above.csv", line, "stretch,stress [kPa]", *rows(1))).specimen == ""

@@ -11,6 +11,7 @@ from tissuq.experiments.reading.headings import dimensions_named, heading
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.units import FORCE, LENGTH, TORQUE, looks_like_unit, strain_factor, stress_unit
+from written_files import written
 
 STRETCH = np.linspace(1, 1.3, 31)
 STRESS = neo_hookean(STRETCH)
@@ -44,11 +45,8 @@ FORCES = [
 ]
 
 
-def written(folder, encoding, head, names, *columns):
-    rows = [";".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
-    path = folder / "test.csv"
-    path.write_bytes("\n".join([*head, names, *rows]).encode(encoding))
-    return path
+def encoded(folder, encoding, head, names, *columns):
+    return written(folder, "\n".join([*head, names]), *columns, separator=";", encoding=encoding)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +54,7 @@ def written(folder, encoding, head, names, *columns):
     [(encoding, names, head) for encodings, names, *head in FORCES for encoding in encodings],
 )
 def test_displacement_force_and_sizes_are_read_in_any_encoding(tmp_path, encoding, names, head):
-    data = tq.read(written(tmp_path, encoding, head, names, 20 * (STRETCH - 1), 10 * STRESS))
+    data = tq.read(encoded(tmp_path, encoding, head, names, 20 * (STRETCH - 1), 10 * STRESS))
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-7)
     np.testing.assert_allclose(data.stress, STRESS, rtol=1e-7, atol=1e-12)
 
@@ -77,7 +75,7 @@ def test_displacement_force_and_sizes_are_read_in_any_encoding(tmp_path, encodin
 def test_strains_and_stresses_are_read_with_their_measures_and_units(tmp_path, names, deformation, load, unit):
     encodings = {"拉": "gb18030", "ż": "cp1250", "인": "cp949"}
     encoding = next((encoding for letter, encoding in encodings.items() if letter in names), "cp1251")
-    data = tq.read(written(tmp_path, encoding, [], names, deformation, load))
+    data = tq.read(encoded(tmp_path, encoding, [], names, deformation, load))
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-7)
     np.testing.assert_allclose(data.stress, STRESS, rtol=1e-7, atol=1e-12)
     assert data.stress_unit == unit
@@ -141,7 +139,7 @@ def test_units_in_russian_and_chinese_are_those_in_latin_letters():
 )
 def test_one_short_name_tells_the_encoding(tmp_path, encoding, name):
     data = tq.read(
-        written(tmp_path, encoding, [], f"Strain;{name} (N)", STRETCH - 1, 10 * STRESS), dimensions={"area": "10 mm2"}
+        encoded(tmp_path, encoding, [], f"Strain;{name} (N)", STRETCH - 1, 10 * STRESS), dimensions={"area": "10 mm2"}
     )
     np.testing.assert_allclose(data.stress, STRESS, atol=1e-6)
     assert f"column '{name} (N)'" in data.source

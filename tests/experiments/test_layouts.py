@@ -10,6 +10,7 @@ from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
 from tissuq.experiments.units import stress_unit
+from written_files import text_file
 
 SIZES = {"length": "20 mm", "area": "10 mm2"}
 STRETCH = ramp()
@@ -21,11 +22,6 @@ CURVE = list(zip((STRETCH - 1).tolist(), neo_hookean(STRETCH).tolist(), strict=T
 
 def lines_of(*columns, separator=","):
     return [separator.join(f"{value:.6f}" for value in row) for row in zip(*columns, strict=True)]
-
-
-def written(path, *lines):
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 def check(tests, names, factors=(1.0, 1.1, 1.2), stretch=STRETCH):
@@ -42,13 +38,13 @@ STATEMENTS = [["L0 (mm)", "20"], ["Width (mm)", "5"], ["Thickness (mm)", "2"], [
 def test_statements_to_the_right_of_a_table_are_of_the_specimen(tmp_path):
     rows = lines_of(MOVED, FORCE)
     rows[:4] = [",".join([row, "", *statement]) for row, statement in zip(rows, STATEMENTS, strict=False)]
-    path = written(tmp_path / "right.csv", "Displacement (mm),Force (N),,Specimen,Tendon 4", *rows)
+    path = text_file(tmp_path / "right.csv", "Displacement (mm),Force (N),,Specimen,Tendon 4", *rows)
     check(read_tests(path), ["right"])
 
 
 def test_words_beside_every_row_are_columns(tmp_path):
     rows = [f"{row},,{name},7" for name in "AB" for row in lines_of(MOVED, FORCE)]
-    path = written(tmp_path / "both.csv", "Displacement (mm),Force (N),,Specimen,Age", *rows)
+    path = text_file(tmp_path / "both.csv", "Displacement (mm),Force (N),,Specimen,Age", *rows)
     check(read_tests(path, dimensions=SIZES), "AB", (1.0, 1.0))
 
 
@@ -56,7 +52,7 @@ def test_a_few_rows_beside_many_are_no_test(tmp_path):
     strain = STRETCH - 1
     rows = lines_of(strain, 1e3 * neo_hookean(STRETCH), strain, 1e3 * neo_hookean(STRETCH))
     rows[2:] = [",".join([*row.split(",")[:2], "", ""]) for row in rows[2:]]
-    path = written(tmp_path / "wide.csv", ",".join(["Strain [-],Stress [kPa]"] * 2), *rows)
+    path = text_file(tmp_path / "wide.csv", ",".join(["Strain [-],Stress [kPa]"] * 2), *rows)
     (test,) = find_tests_in_file(path)
     check([test.reading.experiment], ["1"])
     assert "'2' is left out: of 3 rows or fewer, and no test." in test.reading.warnings
@@ -67,7 +63,7 @@ def test_blocks_of_a_machine_are_named_by_their_numbers(tmp_path):
     for number, factor in enumerate((1.0, 1.1, 1.2), start=1):
         rows = lines_of(np.arange(60) / 10, MOVED, factor * FORCE)
         lines += [f"{number},Time,Extension,Load", ",(s),(mm),(N)", *(f",{row}" for row in rows), ""]
-    check(read_tests(written(tmp_path / "raw.csv", *lines), dimensions=SIZES), "123")
+    check(read_tests(text_file(tmp_path / "raw.csv", *lines), dimensions=SIZES), "123")
 
 
 @pytest.mark.parametrize("name", ["Specimen {}", "Specimen: {}"])
@@ -77,7 +73,7 @@ def test_what_is_stated_above_a_table_is_of_it_and_does_not_name_it(tmp_path, na
         lines += [name.format(f"T{number}"), f"Gauge length: {20 * factor} mm", "Width: 5 mm", "Thickness: 2 mm"]
         lines += ["Displacement (mm)\tForce (N)", *lines_of(factor * MOVED, FORCE, separator="\t")]
     names = ["Specimen T1", "Specimen T2"] if ":" not in name else ["T1", "T2"]
-    check(read_tests(written(tmp_path / "all.txt", *lines)), names, (1.0, 1.0))
+    check(read_tests(text_file(tmp_path / "all.txt", *lines)), names, (1.0, 1.0))
 
 
 @pytest.mark.parametrize("separator", ["\t", ","])
@@ -87,7 +83,7 @@ def test_one_unknown_unit_among_known_ones_is_a_unit(tmp_path, separator):
         separator.join(["mm", "N", "segments"]),
     )
     rows = lines_of(MOVED, FORCE, np.zeros(60), separator=separator)
-    path = written(tmp_path / "mts.txt", *header, *rows)
+    path = text_file(tmp_path / "mts.txt", *header, *rows)
     check(read_tests(path, dimensions=SIZES), ["mts"])
     table = find_tests_in_file(path, dimensions=SIZES)[0].reading.table
     assert table.units == ("mm", "N", "segments")
@@ -112,14 +108,14 @@ def test_of_positions_along_three_axes_the_one_that_moves_is_read(tmp_path, end)
 
 
 def test_names_of_one_letter_are_not_units_of_a_statement_above(tmp_path):
-    path = written(tmp_path / "a.csv", "Operator,JR", "N,s,strain", *lines_of(FORCE, MOVED, STRETCH - 1))
+    path = text_file(tmp_path / "a.csv", "Operator,JR", "N,s,strain", *lines_of(FORCE, MOVED, STRETCH - 1))
     reading = find_tests_in_file(path, columns={"force": "N"}, dimensions={"area": "10 mm2"}, force_unit="N")[0].reading
     assert reading.table.names == ("N", "s", "strain")
 
 
 def test_a_table_that_begins_anew_after_a_blank_line_is_of_two_tests(tmp_path):
     rows = lines_of(MOVED, FORCE), lines_of(MOVED, 1.1 * FORCE)
-    path = written(tmp_path / "blocks.csv", "Displacement (mm),Force (N)", *rows[0], "", *rows[1])
+    path = text_file(tmp_path / "blocks.csv", "Displacement (mm),Force (N)", *rows[0], "", *rows[1])
     tests = find_tests_in_file(path, dimensions=SIZES)
     check([test.reading.experiment for test in tests], "12")
     assert any("begins anew after a blank line" in text for text in tests[0].reading.warnings)
@@ -131,7 +127,7 @@ def test_a_table_that_begins_anew_after_a_blank_line_is_of_two_tests(tmp_path):
 def test_blocks_that_a_column_names_are_parted_by_it(tmp_path, column):
     names = {"words": ("A", "B"), "numbers": ("1", "2")}[column]
     rows = [[f"{name},{row}" for row in lines_of(MOVED, FORCE)] for name in names]
-    path = written(tmp_path / "long.csv", "Specimen,Displacement (mm),Force (N)", *rows[0], "", *rows[1])
+    path = text_file(tmp_path / "long.csv", "Specimen,Displacement (mm),Force (N)", *rows[0], "", *rows[1])
     check(read_tests(path, dimensions=SIZES), names, (1.0, 1.0))
 
 
@@ -139,10 +135,10 @@ def test_a_blank_line_between_cycles_or_in_a_curve_parts_nothing(tmp_path):
     moved, force = np.concatenate([MOVED, MOVED[::-1]]), np.concatenate([FORCE, FORCE[::-1]])
     rows, header = lines_of(moved, force), "Displacement (mm),Force (N)"
     for name, cut in (("cycles", len(rows)), ("curve", 30)):
-        path = written(tmp_path / f"{name}.csv", header, *rows[:cut], "", *rows[cut:], *rows)
+        path = text_file(tmp_path / f"{name}.csv", header, *rows[:cut], "", *rows[cut:], *rows)
         assert len(tq.read(path, dimensions=SIZES)) == 240
     rows = [f"{time / 10},{row}" for time, row in enumerate([*lines_of(MOVED, FORCE)] * 2)]
-    path = written(tmp_path / "time.csv", f"Time (s),{header}", *rows[:60], "", *rows[60:])
+    path = text_file(tmp_path / "time.csv", f"Time (s),{header}", *rows[:60], "", *rows[60:])
     assert len(tq.read(path, dimensions=SIZES)) == 120
 
 
@@ -153,7 +149,7 @@ def test_thousands_separators_are_told_by_numbers_with_both_marks(tmp_path, sepa
         separator.join(f'"{value:,.3f}"'.translate(str.maketrans(",.", marks)) for value in row)
         for row in zip(1e3 * MOVED, 1e3 * FORCE, strict=True)
     ]
-    path = written(tmp_path / "thousands.csv", header, *rows)
+    path = text_file(tmp_path / "thousands.csv", header, *rows)
     check(read_tests(path, dimensions=SIZES), ["thousands"])
     (test,) = find_tests_in_file(path, dimensions=SIZES)
     assert test.reading.warnings[0].startswith(f"'{marks[0]}' was taken for a thousands separator, as in")
@@ -161,9 +157,9 @@ def test_thousands_separators_are_told_by_numbers_with_both_marks(tmp_path, sepa
 
 def test_a_group_of_three_digits_is_thousands_only_where_another_number_says_so(tmp_path):
     rows = ["1,000;0,000", "1,050;0,150", "1,100;0,290"]
-    assert tq.read(written(tmp_path / "a.csv", "stretch;stress (kPa)", *rows)).stretch.max() == pytest.approx(1.1)
+    assert tq.read(text_file(tmp_path / "a.csv", "stretch;stress (kPa)", *rows)).stretch.max() == pytest.approx(1.1)
     rows = ["0;0", "500;150", "1,000;290", "1,500.5;420"]
-    path = written(tmp_path / "b.csv", "displacement (um);stress (kPa)", *rows)
+    path = text_file(tmp_path / "b.csv", "displacement (um);stress (kPa)", *rows)
     assert tq.read(path, length="10 mm").stretch.tolist() == pytest.approx([1, 1.05, 1.1, 1.15005])
 
 
@@ -227,7 +223,7 @@ STRESSES = [1e3 * factor * neo_hookean(STRETCH) for factor in FACTORS]
 @pytest.mark.parametrize("unit", ["(-)", ""])
 def test_specimens_are_named_beneath_the_quantity_that_they_share(tmp_path, above, unit):
     columns = lines_of(STRETCH - 1, *STRESSES, np.mean(STRESSES, axis=0), np.std(STRESSES, axis=0))
-    path = written(tmp_path / "a.csv", above, f"{unit},ID 12,ID 15,Left,mean,SD", *columns)
+    path = text_file(tmp_path / "a.csv", above, f"{unit},ID 12,ID 15,Left,mean,SD", *columns)
     tests = read_tests(path)
     check(tests, ["ID 12", "ID 15", "Left"])
     assert not any(test.standard_error.any() for test in tests)
@@ -242,7 +238,7 @@ def test_specimens_are_named_beneath_the_quantity_that_they_share(tmp_path, abov
 )
 def test_means_and_spreads_beside_specimens_are_none(tmp_path, header, names):
     mean, sd = np.mean(STRESSES, axis=0), np.std(STRESSES, axis=0)
-    path = written(tmp_path / "a.csv", header, *lines_of(STRETCH - 1, *STRESSES, mean, sd))
+    path = text_file(tmp_path / "a.csv", header, *lines_of(STRETCH - 1, *STRESSES, mean, sd))
     tests = read_tests(path, mode="uniaxial")
     check(tests, names)
     assert not any(test.standard_error.any() for test in tests)
@@ -251,14 +247,14 @@ def test_means_and_spreads_beside_specimens_are_none(tmp_path, header, names):
 def test_numbered_stresses_beside_their_mean_are_no_axes(tmp_path):
     header = "Strain,Stress 1 (kPa),Stress 2 (kPa)"
     rows = lines_of(STRETCH - 1, *STRESSES[:2], np.mean(STRESSES[:2], axis=0))
-    check(read_tests(written(tmp_path / "a.csv", f"{header},Average stress (kPa)", *rows)), "12")
+    check(read_tests(text_file(tmp_path / "a.csv", f"{header},Average stress (kPa)", *rows)), "12")
     with pytest.raises(InputError, match="is of a biaxial test"):
-        read_tests(written(tmp_path / "b.csv", f"{header},Temperature (K)", *rows))
+        read_tests(text_file(tmp_path / "b.csv", f"{header},Temperature (K)", *rows))
 
 
 def test_principal_stresses_and_components_are_no_specimens(tmp_path):
     for names in ("S1 (kPa),S2 (kPa),T", "S11 (kPa),S22 (kPa),S33 (kPa)"):
-        path = written(tmp_path / "a.csv", f"Strain,{names}", *lines_of(STRETCH - 1, *STRESSES))
+        path = text_file(tmp_path / "a.csv", f"Strain,{names}", *lines_of(STRETCH - 1, *STRESSES))
         with pytest.raises(InputError, match=r"no column is recognised as stress|is of a biaxial test"):
             read_tests(path)
 
@@ -267,7 +263,7 @@ def test_means_of_groups_are_tests_each_with_its_spread(tmp_path):
     header = "Strain,Control mean (kPa),Control SD (kPa),Treated mean (kPa),Treated SD (kPa)"
     spreads = [0.1 * STRESSES[0] + 0.01, 0.3 * STRESSES[1] + 0.01]
     columns = STRETCH - 1, STRESSES[0], spreads[0], STRESSES[1], spreads[1]
-    path = written(tmp_path / "a.csv", header, *lines_of(*columns))
+    path = text_file(tmp_path / "a.csv", header, *lines_of(*columns))
     tests = read_tests(path, mean_of=10_000)
     check(tests, ["control", "treated"])
     for test, spread in zip(tests, spreads, strict=True):
@@ -294,8 +290,7 @@ def test_results_typed_beside_the_rows_are_no_cells_of_them(tmp_path, above, res
     stress = 50 * (stretch - stretch**-2)
     rows = [f"{x:.8g},{y:.8g}" for x, y in zip(stretch, stress, strict=True)]
     beside = [f"{row},,{text}" for row, text in zip(rows, results, strict=False)] + rows[len(results) :]
-    path = tmp_path / "test.csv"
-    path.write_text("\n".join([f"Stretch,Stress (kPa){above}", *beside]) + "\n", encoding="utf-8")
+    path = text_file(tmp_path / "test.csv", f"Stretch,Stress (kPa){above}", *beside)
     data = tq.read(path)
     np.testing.assert_allclose(data.stretch, stretch, rtol=1e-7)
     np.testing.assert_allclose(data.stress, stress / 1000, rtol=1e-7)
@@ -324,7 +319,7 @@ def test_a_sheet_of_statistics_is_left_out_beside_a_long_test(tmp_path):
 
 def test_a_load_along_one_of_two_axes_is_read_alone_as_the_message_says(tmp_path):
     columns = lines_of(STRETCH, np.ones(len(STRETCH)) + 0.1 * (STRETCH - 1), STRESSES[0])
-    path = written(tmp_path / "a.csv", "stretch x,stretch y,stress x (kPa)", *columns)
+    path = text_file(tmp_path / "a.csv", "stretch x,stretch y,stress x (kPa)", *columns)
     with pytest.raises(InputError, match=r"a load along axis x alone: read that one, axis='x' \(--axis x\)"):
         read_tests(path)
     (test,) = read_tests(path, axis="x", mode="planar")
@@ -335,8 +330,7 @@ def test_a_load_along_one_of_two_axes_is_read_alone_as_the_message_says(tmp_path
 @pytest.mark.parametrize("unit", ["kPa", "kPa ", "MPa", "N/mm2"])
 def test_a_unit_in_every_cell_of_a_column_is_its_unit(tmp_path, separator, unit):
     rows = [f"{100 * x!r} %{separator}{y!r} {unit}" for x, y in CURVE]
-    path = tmp_path / "test.csv"
-    path.write_text("\n".join(["made today", f"strain{separator}stress", *rows]), encoding="utf-8")
+    path = text_file(tmp_path / "test.csv", "made today", f"strain{separator}stress", *rows)
     with pytest.warns(
         UserWarning, match="'stress': the cells are numbers with their unit, and were read as numbers in"
     ):
@@ -354,23 +348,19 @@ def test_a_unit_in_every_cell_of_a_column_is_its_unit(tmp_path, separator, unit)
     ],
 )
 def test_cells_of_several_units_or_another_one_than_the_heading_are_asked_about(tmp_path, name, cells):
-    path = tmp_path / "test.csv"
-    path.write_text(
-        "\n".join([f"stretch;{name}", *(f"1.{k};{cell}" for k, cell in enumerate(cells))]), encoding="utf-8"
-    )
+    path = text_file(tmp_path / "test.csv", f"stretch;{name}", *(f"1.{k};{cell}" for k, cell in enumerate(cells)))
     with pytest.raises(tq.InputError, match=r"line 2, column 'stress.*': '0 kPa' is a number with its unit"):
         tq.read(path)
 
 
 def test_names_of_tests_that_are_loads_with_their_unit_stay_names(tmp_path):
     rows = [f"{1 + x:.6f},{factor * y:.6f},{load}" for load, factor in (("5 N", 1.0), ("10 N", 1.1)) for x, y in CURVE]
-    tests = read_tests(written(tmp_path / "loads.csv", "stretch,stress (MPa),Load", *rows))
+    tests = read_tests(text_file(tmp_path / "loads.csv", "stretch,stress (MPa),Load", *rows))
     assert [test.name for test in tests] == ["5 N", "10 N"]
 
 
 def test_sizes_with_units_in_a_sheet_of_their_own_make_no_table(tmp_path):
-    path = tmp_path / "sizes.csv"
-    path.write_text("\n".join(["Width;Length", *["5 mm;20 mm"] * 8]), encoding="utf-8")
+    path = text_file(tmp_path / "sizes.csv", "Width;Length", *["5 mm;20 mm"] * 8)
     with pytest.raises(tq.InputError, match="holds no rows of numbers"):
         tq.read(path)
 

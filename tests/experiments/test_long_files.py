@@ -7,6 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.reading import tables
+from written_files import text_file
 
 ROWS = tables.LONG_FILE + 500
 
@@ -21,9 +22,7 @@ def lines(separator=",", seed=0):
 
 
 def written(folder, content):
-    path = folder / "long.csv"
-    path.write_text("\n".join(content) + "\n", encoding="utf-8")
-    return path
+    return text_file(folder / "long.csv", *content)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "  "])

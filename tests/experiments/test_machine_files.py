@@ -8,7 +8,7 @@ import pytest
 from machine_files import LAYOUTS, biotester, instron, instron_compression, univert, wintest, zwick
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.read import read_experiment
-from written_files import message
+from written_files import message, text_file
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -80,8 +80,7 @@ def test_dimensions_that_are_not_needed_may_be_unclear(tmp_path):
 
 
 def test_sections_of_the_file_that_contradict_each_other_are_asked_about(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("Length,10,mm\nArea,2,mm2\nDiameter,4,mm\nDisp (mm),Load (N)\n0,0\n1,2\n")
+    path = text_file(tmp_path / "test.csv", "Length,10,mm\nArea,2,mm2\nDiameter,4,mm\nDisp (mm),Load (N)\n0,0\n1,2")
     assert "could be 2 mm2 (in line 2) or 12.5664 mm2 (diameter 4 mm in line 3)" in message(path)
 
 
@@ -89,8 +88,7 @@ def test_sections_of_the_file_that_contradict_each_other_are_asked_about(tmp_pat
     ("unit", "factor"), [("N", 1), ("mN", 1e-3), ("kN", 1e3), ("gf", 9.80665e-3), ("uN", 1e-6), ("µN", 1e-6)]
 )
 def test_forces_are_read_in_their_unit(tmp_path, unit, factor):
-    path = tmp_path / "test.csv"
-    path.write_text(f"Disp [µm],Load [{unit}]\n0,0\n1000,3\n", encoding="utf-8")
+    path = text_file(tmp_path / "test.csv", f"Disp [µm],Load [{unit}]\n0,0\n1000,3")
     data = read_experiment(path, dimensions={"length": "1 cm", "diameter": "2 mm"})
     np.testing.assert_allclose(data.stress, [0, 3 * factor / np.pi], rtol=1e-14)
     np.testing.assert_allclose(data.stretch, [1, 1.1], rtol=1e-14)
@@ -112,14 +110,12 @@ def test_forces_are_read_in_their_unit(tmp_path, unit, factor):
     ],
 )
 def test_units_and_options_that_do_not_fit_the_columns_are_refused(tmp_path, text, options, words):
-    path = tmp_path / "test.csv"
-    path.write_text(text + "0,0\n1,2\n")
+    path = text_file(tmp_path / "test.csv", text + "0,0\n1,2\n")
     assert words in message(path, dimensions={"length": "10 mm", "area": "2 mm2"}, **options)
 
 
 def test_stress_goes_before_force_and_strain_before_displacement(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("Weg [mm];Dehnung [%];Kraft [N];Spannung [MPa]\n0;0;0;0\n1;10;2;0,5\n")
+    path = text_file(tmp_path / "test.csv", "Weg [mm];Dehnung [%];Kraft [N];Spannung [MPa]\n0;0;0;0\n1;10;2;0,5")
     data = read_experiment(path)
     assert (data.stretch.tolist(), data.stress.tolist()) == ([1.0, 1.1], [0.0, 0.5])
 
@@ -133,8 +129,7 @@ def test_compression_is_asked_about_where_a_name_says_it(tmp_path):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_positive_displacements_in_compression_change_their_sign_whatever_that_of_the_force(tmp_path, sign):
-    path = tmp_path / "test.csv"
-    path.write_text(f"Disp [mm],Load [N]\n0,0\n1,{sign * 2}\n")
+    path = text_file(tmp_path / "test.csv", f"Disp [mm],Load [N]\n0,0\n1,{sign * 2}")
     options = {"dimensions": {"length": "10 mm", "area": "2 mm2"}, "compression_positive": True}
     data = read_experiment(path, **options)
     np.testing.assert_allclose(data.stretch, [1.0, 0.9])

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from written_files import written
+from written_files import text_file, written
 
 L = ramp()
 P = 1e3 * neo_hookean(L)  # kPa
@@ -189,8 +189,7 @@ def test_a_height_in_percent_is_no_length(tmp_path):
 
 @pytest.mark.parametrize("mode", ["simple-shear", "uniaxial"])
 def test_columns_without_names_are_asked_for_in_roles_that_the_mode_has(tmp_path, mode):
-    path = tmp_path / "test.csv"
-    path.write_text("".join(f"{k},{strain:.8g}\n" for k, strain in enumerate(L - 1)))
+    path = text_file(tmp_path / "test.csv", "".join(f"{k},{strain:.8g}\n" for k, strain in enumerate(L - 1)))
     role = "shear" if mode == "simple-shear" else "stretch"
     with pytest.raises(InputError, match=rf"--column {role}=1 --column stress=2"):
         tq.read(path, mode=mode)

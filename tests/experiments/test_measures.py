@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.headings import measure_in
 from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.read import read_experiment
-from written_files import by_name, message, written
+from written_files import by_name, message, text_file, written
 
 MU = 0.04  # MPa
 STRETCH = np.array([0.8, 0.9, 1.0, 1.2, 1.5])
@@ -341,7 +341,6 @@ def test_no_other_measure_is_read_as_the_engineering_one_without_a_word(tmp_path
     ],
 )
 def test_a_strain_is_no_type_of_stress_and_a_stress_none_of_strain(tmp_path, strain, stress, words):
-    path = tmp_path / "test.csv"
-    path.write_text(f"{strain},{stress}\n0,0\n0.1,1\n0.2,2\n", encoding="utf-8")
+    path = text_file(tmp_path / "test.csv", f"{strain},{stress}\n0,0\n0.1,1\n0.2,2")
     with pytest.raises(tq.InputError, match=words):
         tq.read(path, strain=strain, stress=stress)

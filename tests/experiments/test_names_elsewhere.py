@@ -6,6 +6,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
+from written_files import text_file
 
 STRETCH = np.linspace(1, 1.4, 20)
 STRAIN, STRESS = 100 * (STRETCH - 1), 1e3 * neo_hookean(STRETCH)
@@ -45,8 +46,7 @@ FILES = {
 
 @pytest.mark.parametrize("kind", FILES)
 def test_columns_are_known_by_names_wherever_they_stand(tmp_path, kind):
-    path = tmp_path / "test.txt"
-    path.write_text(FILES[kind], encoding="utf-8")
+    path = text_file(tmp_path / "test.txt", FILES[kind])
     check(path)
 
 

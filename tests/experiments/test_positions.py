@@ -5,7 +5,7 @@ import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_file
-from written_files import written
+from written_files import text_file, written
 
 LENGTH, AREA = 20.0, 10.0
 SPECIMEN = {"length": "20 mm", "area": "10 mm2"}
@@ -131,8 +131,7 @@ def test_a_distance_of_grips_is_a_length_and_where_it_stays_a_size(tmp_path):
     [("10.2,1\n10.2,2\n", "stays 10.2 mm long"), ("10.2,1\n-5,2\n", "cannot be -5 mm long")],
 )
 def test_what_cannot_be_a_height_is_refused(tmp_path, rows, words):
-    path = tmp_path / "test.csv"
-    path.write_text("Gap (mm),Normal force (N)\n" + rows)
+    path = text_file(tmp_path / "test.csv", "Gap (mm),Normal force (N)\n" + rows)
     with pytest.raises(InputError, match=words):
         tq.read_experiment(path, dimensions={"area": "10 mm2"})
 
@@ -180,7 +179,6 @@ def test_a_machine_gives_way_in_the_direction_of_its_force_whatever_the_signs(tm
 
 
 def test_a_compliance_is_refused_where_the_file_gives_strain_or_stress(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("strain,stress [kPa]\n0,0\n0.1,1\n0.2,2\n")
+    path = text_file(tmp_path / "test.csv", "strain,stress [kPa]\n0,0\n0.1,1\n0.2,2")
     with pytest.raises(InputError, match="is read as strain and stress"):
         read_file(path, compliance="0.5 um/N")

@@ -8,7 +8,7 @@ from marks import slow_but
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.read import read_experiment
-from written_files import message
+from written_files import message, text_file
 
 pytestmark = pytest.mark.filterwarnings("ignore:check the unit:UserWarning")  # many headings here state no unit
 
@@ -100,9 +100,7 @@ BAD = {
 @pytest.fixture
 def written(tmp_path):
     def write(text, name="test.csv"):
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
-        return path
+        return text_file(tmp_path / name, text)
 
     return write
 
@@ -443,8 +441,7 @@ def test_many_rows_are_read_at_once_and_not_one_by_one(tmp_path):
     rows = "".join(f"{1 + i * 1e-6:.6f};{i * 1e-6:.6f}\n".replace(".", ",") for i in range(1000))
     calls = []
     for thousands in (10, 100):
-        path = tmp_path / f"{thousands}.csv"
-        path.write_text("stretch;stress\n" + rows * thousands)
+        path = text_file(tmp_path / f"{thousands}.csv", "stretch;stress\n" + rows * thousands)
         count = 0
 
         def counted(frame, event, argument):

@@ -4,6 +4,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
+from written_files import text_file
 
 STIFFNESS = {"A": 1.0, "B": 1.1, "C": 1.2}
 
@@ -127,8 +128,7 @@ def test_phases_of_one_test_are_no_specimens(tmp_path):
     stretch = np.concatenate([np.linspace(1, 1.3, 30), np.full(10, 1.3), np.linspace(1.3, 1, 30)])  # up, held, down
     phases = ["Stretch"] * 30 + ["Hold"] * 10 + ["Recover"] * 30
     rows = "\n".join(f"{p},{s:.5f},{neo_hookean(s):.6f}" for p, s in zip(phases, stretch, strict=True))
-    path = tmp_path / "test.csv"
-    path.write_text(f"Phase,stretch,stress [MPa]\n{rows}\n")
+    path = text_file(tmp_path / "test.csv", f"Phase,stretch,stress [MPa]\n{rows}")
     assert len(tq.read_experiment(path)) == 70
 
 
@@ -136,8 +136,7 @@ def test_tension_and_compression_of_one_specimen_are_one_test(tmp_path):
     stretch = np.concatenate([np.linspace(1, 1.3, 30), np.linspace(1, 0.7, 30)])
     names = ["tension"] * 30 + ["compression"] * 30
     rows = "\n".join(f"{n},{s:.5f},{neo_hookean(s):.6f}" for n, s in zip(names, stretch, strict=True))
-    path = tmp_path / "test.csv"
-    path.write_text(f"direction,stretch,stress [MPa]\n{rows}\n")
+    path = text_file(tmp_path / "test.csv", f"direction,stretch,stress [MPa]\n{rows}")
     assert len(tq.read_experiment(path)) == 60
 
 
@@ -188,8 +187,7 @@ def test_rows_of_several_loading_modes_are_a_test_each(tmp_path, interleaved):
 def test_directions_of_different_reach_on_both_sides_of_rest_are_tests_of_their_own(tmp_path):
     reaches = {"FS": 0.34, "SF": 0.30, "NF": 0.41}  # they begin 14 % of the range of all apart
     lines = [f"{name},{x:.6f},{x:.6f}" for name, end in reaches.items() for x in np.linspace(-end, end, 40)]
-    path = tmp_path / "shear.csv"
-    path.write_text("direction,shear,stress [kPa]\n" + "\n".join(lines) + "\n")
+    path = text_file(tmp_path / "shear.csv", "direction,shear,stress [kPa]\n" + "\n".join(lines) + "\n")
     tests = tq.read_tests(path, mode="simple-shear")
     assert {test.direction: test.stretch.max() for test in tests} == pytest.approx(reaches)
 
@@ -201,8 +199,7 @@ def test_cycles_whose_way_back_was_measured_stay_one_test_where_they_begin_apart
         for name, begin in (("first", 0.0), ("second", -0.1))
         for x in [*there, *there[::-1]]
     ]
-    path = tmp_path / "shear.csv"
-    path.write_text("part,shear,stress [kPa]\n" + "\n".join(lines) + "\n")
+    path = text_file(tmp_path / "shear.csv", "part,shear,stress [kPa]\n" + "\n".join(lines) + "\n")
     assert len(tq.read_tests(path, mode="simple-shear")) == 1
 
 

@@ -10,7 +10,7 @@ from tissuq.experiments import datasets
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.slack import find_slack
-from written_files import written
+from written_files import text_file, written
 
 LENGTH, SLACK, STIFFNESS = 20.0, 1.5, 0.4
 SPECIMEN = {"length": "20 mm", "area": "2 mm2"}
@@ -43,23 +43,20 @@ def test_rows_that_carry_less_are_dropped_and_told(hanging):
 
 
 def test_a_specimen_that_is_taut_from_the_first_row_starts_there(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("stretch,stress [kPa]\n1.25,2\n1.5,4\n")
+    path = text_file(tmp_path / "test.csv", "stretch,stress [kPa]\n1.25,2\n1.5,4")
     reading = read_file(path, preload="1 kPa")
     np.testing.assert_allclose(reading.experiment.stretch, [1.0, 1.2])
     assert "in line 2, the first, where the stress is already 2 kPa" in reading.used.steps[2]
 
 
 def test_compression_is_taut_by_the_size_of_its_stress(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("strain,stress [kPa]\n0,0\n-0.1,0\n-0.2,-10\n-0.3,-20\n")
+    path = text_file(tmp_path / "test.csv", "strain,stress [kPa]\n0,0\n-0.1,0\n-0.2,-10\n-0.3,-20")
     data = read_experiment(path, preload="5 kPa")
     np.testing.assert_allclose(data.stretch, [0.8 / 0.85, 0.7 / 0.85])
 
 
 def test_cauchy_stress_is_divided_by_the_stretch_counted_from_the_preload(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("stretch,Cauchy stress [kPa]\n1.2,2\n1.5,4\n")
+    path = text_file(tmp_path / "test.csv", "stretch,Cauchy stress [kPa]\n1.2,2\n1.5,4")
     data = read_experiment(path, stress_type="cauchy", preload="2 kPa")
     np.testing.assert_allclose(data.stress, [0.002, 0.004 / 1.25])
 
@@ -81,8 +78,7 @@ def test_a_preload_that_cannot_be_meant_is_refused(hanging, preload, words):
 
 
 def test_a_force_is_no_preload_of_a_file_of_stresses(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("stretch,stress\n1,0\n1.1,2\n")
+    path = text_file(tmp_path / "test.csv", "stretch,stress\n1,0\n1.1,2")
     with pytest.raises(InputError, match="is a force, but the file gives stresses"):
         read_experiment(path, preload="1 N")
 

@@ -10,7 +10,7 @@ import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments.reading.headings import of_spread
 from tissuq.experiments.reading.read import read_experiment
-from written_files import by_name
+from written_files import by_name, text_file
 
 STRETCH = np.linspace(1.0, 1.3, 7)
 STRESS = 100 * (STRETCH - STRETCH**-2)  # kPa
@@ -72,8 +72,7 @@ def test_the_spread_of_the_strain_is_not_that_of_the_stress(tmp_path):
 
 
 def test_of_two_without_a_unit_the_one_beside_the_stress_is_its_spread(tmp_path):
-    file = tmp_path / "test.csv"
-    file.write_text("Strain,SEM,Stress (kPa),SEM\n0,0.01,0,0.1\n0.1,0.02,2,0.3\n0.2,0.03,5,0.5\n")
+    file = text_file(tmp_path / "test.csv", "Strain,SEM,Stress (kPa),SEM\n0,0.01,0,0.1\n0.1,0.02,2,0.3\n0.2,0.03,5,0.5")
     np.testing.assert_allclose(read_experiment(file).standard_error, [1e-4, 3e-4, 5e-4])
 
 
@@ -148,8 +147,7 @@ def test_a_number_of_specimens_that_the_file_states_is_proposed(tmp_path, line, 
 
 
 def test_a_cell_that_is_no_number_leaves_the_column_out_with_a_note(tmp_path):
-    file = tmp_path / "test.csv"
-    file.write_text("Strain,Stress (kPa),SEM (kPa)\n0,0,-\n0.1,2,0.3\n0.2,5,0.5\n")
+    file = text_file(tmp_path / "test.csv", "Strain,Stress (kPa),SEM (kPa)\n0,0,-\n0.1,2,0.3\n0.2,5,0.5")
     assert any("line 2, column 'SEM (kPa)'" in text for text in tq.inspect(file).warnings)
 
 

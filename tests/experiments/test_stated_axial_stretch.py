@@ -5,15 +5,14 @@ import pytest
 
 import tissuq as tq
 from tissuq.errors import InputError
+from written_files import text_file
 
 SIZES = {"diameter": "1.2 mm", "thickness": "0.15 mm"}
 ROWS = "0,1.0\n10,1.12\n20,1.25\n40,1.43\n60,1.52\n80,1.57\n100,1.6\n120,1.62\n"
 
 
 def tube(folder, line, name="artery.csv"):
-    file = folder / name
-    file.write_text(f"Rat aorta\n{line}\nPressure (mmHg),Outer diameter (mm)\n{ROWS}", encoding="utf-8")
-    return file
+    return text_file(folder / name, f"Rat aorta\n{line}\nPressure (mmHg),Outer diameter (mm)\n{ROWS}")
 
 
 @pytest.mark.parametrize(
@@ -88,6 +87,5 @@ def test_a_line_says_the_axial_stretch_where_the_force_was_measured_too(tmp_path
 
 
 def test_it_says_nothing_where_no_tube_was_inflated(tmp_path):
-    file = tmp_path / "strip.csv"
-    file.write_text("Axial stretch: 1.5\nstrain,stress (kPa)\n0,0\n0.1,3\n0.2,6\n0.3,10\n")
+    file = text_file(tmp_path / "strip.csv", "Axial stretch: 1.5\nstrain,stress (kPa)\n0,0\n0.1,3\n0.2,6\n0.3,10")
     assert tq.read(file).mode.name == "uniaxial"

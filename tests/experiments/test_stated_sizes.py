@@ -10,6 +10,7 @@ import pytest
 import tissuq as tq
 from tissuq import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
+from written_files import text_file
 
 LENGTH, THICKNESS = 20.0, 2.0
 WIDTHS = {"A 1": 5.0, "A 2": 4.0}
@@ -30,9 +31,7 @@ MEASURED = rows(LENGTH * (STRETCH - 1), forces(5))
 
 
 def written(folder, text, name="test.csv"):
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
-    return path
+    return text_file(folder / name, text)
 
 
 def columns_of_sizes(folder, sizes="{:g};{:g};{:g};"):

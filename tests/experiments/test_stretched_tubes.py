@@ -28,6 +28,7 @@ from thick_tubes import (
 )
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.reading.tube import Tube
+from written_files import text_file
 
 ISOTROPIC = (neo_hookean, mooney_rivlin, yeoh, ogden, gent, demiray)
 ROWS = 31
@@ -70,16 +71,12 @@ def rows_of(law, axial, noise=0.0, seed=0):
 
 
 def written(folder, axial, law=neo_hookean, name="artery.csv", **options):
-    file = folder / name
-    file.write_text("\n".join(["Pressure (mmHg),Outer diameter (um)", *rows_of(law, axial, **options)]))
-    return file
+    return text_file(folder / name, "Pressure (mmHg),Outer diameter (um)", *rows_of(law, axial, **options))
 
 
 def written_with_column(folder, stretches, law=neo_hookean, heading="Axial stretch", scale=1, **options):
     rows = [f"{row},{scale * axial:g}" for axial in stretches for row in rows_of(law, axial, **options)]
-    file = folder / "artery.csv"
-    file.write_text("\n".join([f"Pressure (mmHg),Outer diameter (um),{heading}", *rows]))
-    return file
+    return text_file(folder / "artery.csv", f"Pressure (mmHg),Outer diameter (um),{heading}", *rows)
 
 
 def expected(law, stretches):

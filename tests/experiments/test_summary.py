@@ -6,6 +6,7 @@ import pytest
 import tissuq as tq
 from machine_files import cycles, neo_hookean
 from tissuq.errors import InputError
+from written_files import text_file
 
 COLUMNS = "Time (s),Strain (%),Stress (kPa)"
 SUMMARIES = {
@@ -24,9 +25,7 @@ def measured(rows=40, turns=False, seed=0):
 
 def written(folder, values, *end, names=COLUMNS):
     rows = [",".join(f"{value:.4f}" for value in row) for row in values]
-    path = folder / "test.csv"
-    path.write_text("\n".join([names, *rows, *end]) + "\n")
-    return path
+    return text_file(folder / "test.csv", names, *rows, *end)
 
 
 def summary_row(values, name, time="", digits=4):

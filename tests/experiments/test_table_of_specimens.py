@@ -11,16 +11,12 @@ import tissuq as tq
 from command_line import done_in, run_in
 from tissuq.experiments.reading.specimens_in_files import read_column
 from tissuq.experiments.reading.table_of_specimens import TableOfSizes
+from written_files import text_file
 
 SIZES = {"A": (20.0, 10.2, 3.1), "B": (21.5, 9.8, 2.9), "C": (19.2, 10.0, 3.3)}
 """Length, width and thickness of the specimens, mm."""
 HEADER = "specimen,length [mm],width [mm],thickness [mm]"
 MODULUS_MPA = {"A": 0.002, "B": 0.0015, "C": 0.0027}
-
-
-def write(path, *lines):
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 def stress(name, stretch):
@@ -46,8 +42,8 @@ def laboratory(tmp_path):
     folder = tmp_path / "tests"
     folder.mkdir()
     for name in SIZES:
-        write(folder / f"{name}.csv", "displacement [mm],force [N]", *rows_of(name, stretch))
-    write(folder / "sizes.csv", HEADER, *(",".join(map(str, (name, *sizes))) for name, sizes in SIZES.items()))
+        text_file(folder / f"{name}.csv", "displacement [mm],force [N]", *rows_of(name, stretch))
+    text_file(folder / "sizes.csv", HEADER, *(",".join(map(str, (name, *sizes))) for name, sizes in SIZES.items()))
     return folder
 
 
@@ -65,19 +61,19 @@ def check_stress(experiment, name):
     ],
 )
 def test_tables_of_laboratories_are_read(tmp_path, lines, expected):
-    (sizes,) = tq.read_sizes(write(tmp_path / "sizes.csv", *lines)).values()
+    (sizes,) = tq.read_sizes(text_file(tmp_path / "sizes.csv", *lines)).values()
     assert {name: float(text.removesuffix(" mm")) for name, text in sizes.items()} == pytest.approx(
         dict(zip(("length", "width", "thickness"), expected, strict=True))
     )
 
 
 def test_an_area_takes_the_place_of_the_sides_that_it_is_of(tmp_path):
-    table = write(tmp_path / "sizes.csv", "name,area [mm2],width [mm],thickness [mm]", "A,30,10,3")
+    table = text_file(tmp_path / "sizes.csv", "name,area [mm2],width [mm],thickness [mm]", "A,30,10,3")
     assert tq.read_sizes(table) == {"A": {"area": "30.0 mm2", "thickness": "3.0 mm"}}
 
 
 def test_a_height_is_the_length_where_no_other_is_named(tmp_path):
-    table = write(tmp_path / "sizes.csv", "name,height [mm],diameter [mm]", "A,8,12", "B,,9")
+    table = text_file(tmp_path / "sizes.csv", "name,height [mm],diameter [mm]", "A,8,12", "B,,9")
     assert tq.read_sizes(table) == {"A": {"diameter": "12.0 mm", "length": "8.0 mm"}, "B": {"diameter": "9.0 mm"}}
 
 
@@ -96,7 +92,7 @@ def test_a_height_is_the_length_where_no_other_is_named(tmp_path):
 )
 def test_what_is_no_table_of_sizes_is_refused(tmp_path, lines, words):
     with pytest.raises(tq.InputError) as refusal:
-        tq.read_sizes(write(tmp_path / "sizes.csv", *lines))
+        tq.read_sizes(text_file(tmp_path / "sizes.csv", *lines))
     assert words in str(refusal.value)
 
 
@@ -137,7 +133,7 @@ def test_a_population_takes_the_sizes_of_its_specimens_and_is_repeated_with_them
 def test_specimens_in_a_column_have_the_sizes_of_their_rows(laboratory, tmp_path):
     stretch = np.linspace(1.0, 1.3, 20)
     lines = [f"{name},{row}" for name in SIZES for row in rows_of(name, stretch)]
-    file = write(tmp_path / "all.csv", "sample,displacement [mm],force [N]", *lines)
+    file = text_file(tmp_path / "all.csv", "sample,displacement [mm],force [N]", *lines)
     for name, (reading,) in read_column(file, "sample", TableOfSizes.read(laboratory / "sizes.csv")).items():
         check_stress(reading.experiment, name)
 
@@ -148,14 +144,14 @@ def test_a_folder_of_tests_has_the_sizes_of_its_specimen(laboratory, tmp_path):
         folder.mkdir(parents=True)
         for number, low in enumerate((1.0, 1.01), 1):
             rows = rows_of(name, np.linspace(low, 1.3, 20))
-            write(folder / f"test {number}.csv", "displacement [mm],force [N]", *rows)
+            text_file(folder / f"test {number}.csv", "displacement [mm],force [N]", *rows)
     options = ["--sizes", laboratory / "sizes.csv", "--discrepancy", "none", "--no-figures", "--out", tmp_path / "run"]
     assert "modulus" in done_in(tmp_path, "population", tmp_path / "specimens", *options).out
 
 
 @pytest.mark.parametrize("command", ["inspect", "fit", "population"])
 def test_a_file_without_a_row_is_refused(laboratory, tmp_path, command):
-    table = write(tmp_path / "others.csv", HEADER, "X,20,10,3")
+    table = text_file(tmp_path / "others.csv", HEADER, "X,20,10,3")
     (laboratory / "sizes.csv").unlink()
     said = run_in(laboratory, command, laboratory, "--sizes", table).err
     assert "others.csv has no row for" in said

@@ -12,6 +12,7 @@ from machine_files import MU, neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
+from written_files import text_file
 
 STIFFNESS = {"S1": 1.0, "S2": 1.1, "S3": 1.2}
 SIZES = {"length": "10 mm", "area": "10 mm2"}
@@ -515,8 +516,7 @@ BIAXIAL = """stretch x,stretch y,stress x [kPa],stress y [kPa]
 
 
 def test_one_axis_of_a_biaxial_machine_is_read_without_a_mode(tmp_path):
-    path = tmp_path / "sheet.csv"
-    path.write_text(BIAXIAL)
+    path = text_file(tmp_path / "sheet.csv", BIAXIAL)
     for options in ({"axis": "y"}, {"columns": {"stretch": "stretch y", "stress": "stress y [kPa]"}}):
         (test,) = read_tests(path, **options)
         assert test.mode.name == "uniaxial"
@@ -526,8 +526,7 @@ def test_one_axis_of_a_biaxial_machine_is_read_without_a_mode(tmp_path):
 
 
 def test_shear_tests_beside_one_another_tell_their_mode(tmp_path):
-    path = tmp_path / "fungi.csv"
-    path.write_text("Shear,Stress S1 [kPa],Stress S2 [kPa]\n0,0,0\n0.1,1,1.2\n0.2,2,2.4\n")
+    path = text_file(tmp_path / "fungi.csv", "Shear,Stress S1 [kPa],Stress S2 [kPa]\n0,0,0\n0.1,1,1.2\n0.2,2,2.4")
     tests = find_tests_in_file(path)
     assert [(test.name, test.options["mode"], test.reading.mode_source) for test in tests] == [
         ("s1", "simple-shear", "a column of shear"), ("s2", "simple-shear", "a column of shear")
@@ -591,6 +590,5 @@ def test_the_name_of_a_machine_or_of_its_settings_is_no_loading_mode(tmp_path, l
 def test_tables_under_the_same_title_are_numbered(tmp_path):
     rows = [f"{x - 1:.4f}\t{1e3 * neo_hookean(x):.6f}" for x in np.linspace(1, 1.3, 20)]
     block = "\n".join(["<DATA>", "Strain\tStress (kPa)", *rows, "<END DATA>"])
-    path = tmp_path / "mach.txt"
-    path.write_text(f"<Mach-1 File>\n{block}\n{block}\n")
+    path = text_file(tmp_path / "mach.txt", f"<Mach-1 File>\n{block}\n{block}")
     assert [test.name for test in read_tests(path)] == ["<DATA> 1", "<DATA> 2"]

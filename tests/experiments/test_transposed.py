@@ -8,15 +8,14 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
+from written_files import text_file
 
 STRETCH = ramp(rows=12)
 STRESS = neo_hookean(STRETCH)
 
 
 def written(folder, *rows, separator=","):
-    path = folder / "test.csv"
-    path.write_text("\n".join(separator.join(row) for row in rows) + "\n", encoding="utf-8")
-    return path
+    return text_file(folder / "test.csv", *(separator.join(row) for row in rows))
 
 
 def line(name, values, form="{:.9g}"):
@@ -71,6 +70,5 @@ def test_exponents_of_fortran_are_read(tmp_path, letter):
 
 def test_a_column_of_labels_that_are_names_of_quantities_stands_upright(tmp_path):
     lines = [f"Stretch,{k},{1 + 0.01 * k:.2f},{k},{k}" for k in range(30)]
-    path = tmp_path / "sets.csv"
-    path.write_text("\n".join(["SetName,Time_S,stretch,stress [kPa],temperature", *lines]) + "\n")
+    path = text_file(tmp_path / "sets.csv", "SetName,Time_S,stretch,stress [kPa],temperature", *lines)
     assert tq.read(path).stretch.tolist() == pytest.approx([1 + 0.01 * k for k in range(30)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from written_files import text_file
 
 STRETCH = np.linspace(1.0, 1.3, 12)
 STRESS = 100 * (STRETCH - STRETCH**-2)  # kPa
@@ -25,9 +26,7 @@ SIZES = {"dimensions": {"length": "20 mm", "area": "20 mm2"}}
 
 def written(folder, names, kinds, above="", units=""):
     rows = [",".join(f"{value:.9g}" for value in row) for row in zip(*(COLUMNS[kind] for kind in kinds), strict=True)]
-    file = folder / "test.csv"
-    file.write_text("\n".join(filter(None, [above, names, units, *rows])) + "\n", encoding="utf-8")
-    return file
+    return text_file(folder / "test.csv", *filter(None, [above, names, units, *rows]))
 
 
 @pytest.mark.parametrize(

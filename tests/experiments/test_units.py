@@ -7,6 +7,7 @@ import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.units import FORCE, LENGTH, looks_like_unit, strain_factor, stress_unit
+from written_files import text_file
 
 MPA = {
     "MPa": 1.0,
@@ -139,16 +140,14 @@ def test_every_unit_that_is_converted_looks_like_one(quantity):
     ],
 )
 def test_a_row_of_units_in_words_stands_beneath_the_names(tmp_path, cells, stretch, stress):
-    path = tmp_path / "test.csv"
-    path.write_text(f"strain,stress\n{cells}\n0,0\n500,1\n1000,2\n", encoding="utf-8")
+    path = text_file(tmp_path / "test.csv", f"strain,stress\n{cells}\n0,0\n500,1\n1000,2")
     data = tq.read(path)
     assert data.stretch[-1] == pytest.approx(stretch)
     assert data.stress[-1] == pytest.approx(stress)
 
 
 def test_forces_and_displacements_have_units_in_words(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("Displacement,Force\nmillimeters,Millinewtons\n0,0\n0.5,1\n1,2\n", encoding="utf-8")
+    path = text_file(tmp_path / "test.csv", "Displacement,Force\nmillimeters,Millinewtons\n0,0\n0.5,1\n1,2")
     data = tq.read(path, length="10 mm", area="2 mm2")
     assert data.stretch[-1] == pytest.approx(1.1)
     assert data.stress[-1] == pytest.approx(1e-3)

@@ -14,7 +14,7 @@ from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.inspection import inspect
 from tissuq.experiments.reading.read import read_experiment
 from tissuq.experiments.reading.tests_in_file import read_tests
-from written_files import message
+from written_files import message, text_file
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
 
@@ -71,8 +71,7 @@ def test_a_sheet_that_is_not_there_is_answered_with_those_that_are(book):
 
 
 def test_a_text_file_has_no_sheets(tmp_path):
-    path = tmp_path / "test.csv"
-    path.write_text("stretch,stress\n1,0\n")
+    path = text_file(tmp_path / "test.csv", "stretch,stress\n1,0")
     assert "is not an Excel workbook and has no sheets" in message(path, sheet=1)
 
 
