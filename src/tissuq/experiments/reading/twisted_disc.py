@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -47,43 +47,34 @@ def rim_stress(shear: FloatArray, apparent: FloatArray) -> FloatArray:
     shares, sizes = shear / np.abs(shear).max(), apparent / max(float(np.abs(apparent).max()), np.finfo(float).tiny)
     if shares @ sizes <= 0:
         raise InputError("the torque does not have the sign of the twist: change one of the signs in the file.")
-    squares = shares**2
-    coefficients = min(_log_fits(sizes, shares, squares), key=lambda fit: fit.criterion).coefficients
+    coefficients = _coefficients(shares, sizes)
     degrees = np.arange(len(coefficients))
-    slope = 1 + squares[:, None] ** degrees @ (2 * degrees * coefficients)
+    slope = 1 + (shares**2)[:, None] ** degrees @ (2 * degrees * coefficients)
     return np.asarray(apparent * (3 + slope) / 4)
 
 
-class _LogFit(NamedTuple):
-    """A curve through measurements: its Bayesian information criterion and its coefficients."""
+def _coefficients(shares: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return c of the curve s exp(sum over k of c_k s^2k) of shares s (n,) that is nearest to sizes (n,) of about one.
 
-    criterion: float
-    coefficients: FloatArray
-
-
-def _log_fits(sizes: FloatArray, shape: FloatArray, variable: FloatArray) -> list[_LogFit]:
-    """Return curves shape exp(sum over k of c_k variable^k) of degree 0 to 3 through sizes (n,), the largest about one.
-
-    Each is nearest to the measurements by least squares, with the criterion by which one is chosen. The shape is of
-    their sign, so that degree 0 is a factor.
+    Of the curves of degree 0 to 3 it is that of the least criterion.
     """
-    powers, fits = variable[:, None] ** np.arange(MAX_DEGREE + 1), list[_LogFit]()
-    coefficients = np.log([shape @ sizes / (shape @ shape)])
-    degrees = min(MAX_DEGREE, len(np.unique(np.abs(shape))) // POINTS_OF_TERM - 1)
+    powers, fits = (shares**2)[:, None] ** np.arange(MAX_DEGREE + 1), dict[float, FloatArray]()
+    coefficients = np.log([shares @ sizes / (shares @ shares)])
+    degrees = min(MAX_DEGREE, len(np.unique(np.abs(shares))) // POINTS_OF_TERM - 1)
     for degree in range(max(degrees, 0) + 1):
         first = np.append(coefficients, np.zeros(degree + 1 - len(coefficients)))
-        coefficients, misfit = _fitted(sizes, shape, powers[:, : degree + 1], first)
+        coefficients, misfit = _fitted(sizes, shares, powers[:, : degree + 1], first)
         criterion = len(sizes) * np.log(max(misfit, SMALLEST_MISFIT)) + len(coefficients) * np.log(len(sizes))
-        fits.append(_LogFit(float(criterion), coefficients))
-    return fits
+        fits.setdefault(float(criterion), coefficients)
+    return fits[min(fits)]
 
 
-def _fitted(sizes: FloatArray, shape: FloatArray, columns: FloatArray, first: FloatArray) -> tuple[FloatArray, float]:
+def _fitted(sizes: FloatArray, shares: FloatArray, columns: FloatArray, first: FloatArray) -> tuple[FloatArray, float]:
     """Return the coefficients for powers (n, k), and the mean square of the misfit."""
     from scipy.optimize import least_squares
 
     def curve(coefficients: Any) -> Any:
-        return shape * np.exp(np.minimum(columns @ coefficients, LARGEST_LOG))
+        return shares * np.exp(np.minimum(columns @ coefficients, LARGEST_LOG))
 
     result = least_squares(
         lambda coefficients: curve(coefficients) - sizes,
