@@ -32,8 +32,11 @@ SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
 NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak|end of")
 """In a line above the table that speaks of strain or stress without saying what the columns hold."""
-NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
-"""Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
+MAY_BE_OTHER = {
+    "strain": re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}"),
+    "stress": re.compile(OTHER_MEASURE),
+}
+"""Names of a strain or stress that is, or may be, another one than the engineering one, such as Green's strain."""
 TENSOR_SHEAR = re.compile(r"\b(e|eps|epsilon|ε)[ _]?([1-3xyzrθ])(?!\2)[1-3xyzrθ]\b|tensor")
 """Names of a shear strain that is a component of a tensor: half of the amount of shear."""
 SHEAR_STRESS = re.compile(
@@ -193,34 +196,30 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
             f"says, but read as {choice.measure}. Leave strain_type out, or give the column as strain "
             "(--column strain=NAME)."
         )
-    if is_strain and not strain_type and NOT_ENGINEERING_STRAIN.search(name):
-        raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {say_which('strain')}")
     if choice.measure == "shear" and not strain_type and TENSOR_SHEAR.search(name):
         raise InputError(
             f"{table.place(choice.deformation)} is named as a component of a strain tensor, which is half of the "
             "amount of shear: to read twice its values give --strain-type green. If it holds the amount of shear "
             "(gamma) all the same, give --strain-type engineering."
         )
-    if choice.load == "stress" and not stress_type and re.search(OTHER_MEASURE, contents.quantities[choice.stress]):
-        raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {say_which('stress')}")
-    if is_strain and not strain_type:
-        _check_lines_above(table, choice.deformation, "strain")
-    if choice.load == "stress" and not stress_type:
-        _check_lines_above(table, choice.stress, "stress")
+    of_strain = choice.deformation, "strain", strain_type
+    of_stress = choice.stress, "stress", stress_type if choice.load == "stress" else ""
+    both = [of_strain] * is_strain + [of_stress] * (choice.load == "stress")
+    are_open = [(column, kind) for column, kind, measure in both if not measure]
+    for column, kind in are_open:
+        if MAY_BE_OTHER[kind].search(contents.quantities[column]):
+            raise InputError(f"{table.place(column)} may be a {kind} of several types. {say_which(kind)}")
+    for column, kind in are_open:
+        _check_lines_above(table, column, kind)
     is_told = contents.strain_type or contents.stress_type
-    if is_strain and choice.load == "stress" and not is_told and (strain_type == "") != (stress_type == ""):
-        stated, unstated = ("strain", "stress") if strain_type else ("stress", "strain")
-        column, column_of_type = choice.stress, choice.deformation
-        if unstated == "strain":
-            column, column_of_type = column_of_type, column
-        if (strain_type or stress_type) != "engineering":
-            raise InputError(
-                f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
-                f"{table.label(column_of_type)} is {strain_type or stress_type}. {say_which(unstated)}"
-            )
-    of_stress = stress_type if choice.load == "stress" else ""
-    types = (choice.deformation, "strain", strain_type), (choice.stress, "stress", of_stress)
-    for column, kind, measure in types:
+    others = [stated for stated in both if stated[2] not in ("", "engineering")]
+    if are_open and others and not is_told:
+        (column, kind), (other, other_kind, measure) = are_open[0], others[0]
+        raise InputError(
+            f"{table.place(column)} does not say which type of {kind} it is, and {other_kind} {table.label(other)} is "
+            f"{measure}. {say_which(kind)}"
+        )
+    for column, kind, measure in (of_strain, of_stress):
         if measure and measure not in (STRAIN_MEASURES if kind == "strain" else STRESS_MEASURES):
             raise InputError(
                 f"{table.place(column)} is read as {kind}, and its name says '{measure}', which is no type of {kind}. "
