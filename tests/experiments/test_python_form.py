@@ -10,7 +10,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.reading.findings import data_warnings
-from tissuq.experiments.reading.options import READING_OPTIONS, spelled_out
+from tissuq.experiments.reading.options import spelled_out
 from tissuq.experiments.reading.python_form import SWITCHES, in_python
 from tissuq.result_warning import ResultWarning
 from tissuq.studies.answers import READING
@@ -50,7 +50,7 @@ def test_a_refusal_of_a_table_proposes_arguments(name):
 def test_every_option_of_reading_is_an_argument_of_python(option):
     value = "" if option in SWITCHES else VALUES.get(option, "3")
     arguments = eval(f"dict({in_python(f'--{option} {value}'.strip())})")
-    assert spelled_out(arguments, READING_OPTIONS)
+    assert spelled_out(arguments)
 
 
 def test_lines_to_leave_out_stay_together():

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from tissuq.experiments.reading.conversion import (
 )
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.measured_rows import Cycle, MeasuredRows, find_cycles
-from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
+from tissuq.experiments.reading.options import PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_stretches, volume_step
 from tissuq.experiments.reading.recognition import ColumnChoice, adding
 from tissuq.experiments.reading.regions import AUTO, TestedStress, least_errors, tested_stresses
@@ -111,7 +111,7 @@ class Reading:
 
 def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     """Read a file as `tissuq.read` does, and keep what was done on the way."""
-    plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
+    plain = spelled_out(options)
     if (mode := plain.get("mode")) is not None:
         checked_mode(mode, plain)
     table = read_table(path, **plain)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 
 import numpy as np
 
@@ -109,17 +109,13 @@ NAMES_OF_SHELL = {"estimand": "tolerances"}
 """Options of the shell that have another name in Python."""
 
 
-def spelled_out(
-    options: Mapping[str, Any], known_names: Collection[str], more_names: Collection[str] = ()
-) -> dict[str, Any]:
+def spelled_out(options: Mapping[str, Any], more_names: Collection[str] = ()) -> ReadingOptions:
     """Return options of reading without those that are entries of others, and with quantities as texts.
 
     Parameters
     ----------
     options : mapping
         By name.
-    known_names : collection of str
-        Names of the options of reading.
     more_names : collection of str
         Names of other options of the same function.
 
@@ -130,14 +126,14 @@ def spelled_out(
 
     Examples
     --------
-    >>> spelled_out({"force": "Fz", "length": "20 mm", "unit": "kPa"}, ["columns", "dimensions", "stress_unit"])
+    >>> spelled_out({"force": "Fz", "length": "20 mm", "unit": "kPa"})
     {'columns': {'force': 'Fz'}, 'dimensions': {'length': '20 mm'}, 'stress_unit': 'kPa'}
     """
     result: dict[str, Any] = {}
     for name, value in options.items():
         option = PARTS.get(name) or ("stress_unit" if name == "unit" else name)
-        if option not in known_names:
-            names = [*known_names, *PARTS, "unit", *more_names]
+        if option not in READING_OPTIONS:
+            names = [*READING_OPTIONS, *PARTS, "unit", *more_names]
             close = [
                 other for other in (NAMES_OF_SHELL.get(name), *get_close_matches(name, names, n=1)) if other in names
             ]
@@ -154,7 +150,7 @@ def spelled_out(
             result[option] = value
         elif name not in PARTS and name != "unit":
             result.setdefault(name, _as_texts(value))
-    return result
+    return cast(ReadingOptions, result)
 
 
 def _plain(name: str, value: Any) -> str | int:

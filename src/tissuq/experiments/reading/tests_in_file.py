@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple, Unpack, cast
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
-from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
+from tissuq.experiments.reading.options import PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.python_form import is_to_be_read, refusals_worded_for
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
@@ -89,7 +89,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
 def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False) -> list[Experiment]:
     """Return all tests in one file or table, and warn of what there is to know of them."""
     with refusals_worded_for(path):
-        plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
+        plain = spelled_out(options)
         tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
     experiments = [experiment_of(test.reading) for test in tests]
     names_of_text = dict[str, list[str]]()
@@ -123,7 +123,7 @@ def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[Py
     >>> measurements({"stretch": [1.0, 1.1], "stress": [0.0, 0.2]}, unit="MPa").stress.tolist()
     [0.0, 0.2]
     """
-    spelled_out(options, READING_OPTIONS, more_names)
+    spelled_out(options, more_names)
     if is_to_be_read(data):
         return Experiment.of(read_tests(data, **options))
     if isinstance(data, Experiment):
