@@ -1,7 +1,8 @@
-"""Files that tests of reading write, of lines or of columns of numbers, and what refusals of them say."""
+"""Files that tests of reading write, of lines or of columns of numbers, what is read of them, and what refusals say."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from tissuq.errors import InputError
@@ -30,3 +31,9 @@ def message(path, **options):
     with pytest.raises(InputError) as caught:
         read_experiment(path, **options)
     return str(caught.value)
+
+
+def check_curve(data, stretch, stress, *, rtol=1e-7, atol=0.0, stress_atol=0.0):
+    """Compare what was read with what was measured; stresses of nearly zero may have a tolerance of their own."""
+    np.testing.assert_allclose(data.stretch, stretch, rtol=rtol, atol=atol)
+    np.testing.assert_allclose(data.stress, stress, rtol=rtol, atol=atol or stress_atol)

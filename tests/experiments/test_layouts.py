@@ -10,7 +10,7 @@ from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
 from tissuq.experiments.units import stress_unit
-from written_files import text_file
+from written_files import check_curve, text_file
 
 SIZES = {"length": "20 mm", "area": "10 mm2"}
 STRETCH = ramp()
@@ -28,8 +28,7 @@ def check(tests, names, factors=(1.0, 1.1, 1.2), stretch=STRETCH):
     """Compare tests with neo-Hookean specimens, each so many times as stiff."""
     assert [test.name for test in tests] == list(names)
     for test, factor in zip(tests, factors, strict=False):
-        np.testing.assert_allclose(test.stretch, stretch, atol=2e-6)
-        np.testing.assert_allclose(test.stress, factor * neo_hookean(test.stretch), atol=2e-6)
+        check_curve(test, stretch, factor * neo_hookean(test.stretch), atol=2e-6)
 
 
 STATEMENTS = [["L0 (mm)", "20"], ["Width (mm)", "5"], ["Thickness (mm)", "2"], ["Fmax (N)", "0.3"]]
@@ -103,8 +102,7 @@ def test_of_positions_along_three_axes_the_one_that_moves_is_read(tmp_path, end)
     path.write_text(f"{head}{names}\n{''.join(rows)}{end}")
     with pytest.warns(UserWarning, match=r"check the column: 'Position \(z\), mm' was taken for the displacement"):
         data = tq.read(path, length="10 mm", area="10 mm2")
-    np.testing.assert_allclose(data.stretch, stretch, atol=2e-6)
-    np.testing.assert_allclose(data.stress, neo_hookean(stretch), atol=2e-6)
+    check_curve(data, stretch, neo_hookean(stretch), atol=2e-6)
 
 
 def test_names_of_one_letter_are_not_units_of_a_statement_above(tmp_path):
@@ -292,8 +290,7 @@ def test_results_typed_beside_the_rows_are_no_cells_of_them(tmp_path, above, res
     beside = [f"{row},,{text}" for row, text in zip(rows, results, strict=False)] + rows[len(results) :]
     path = text_file(tmp_path / "test.csv", f"Stretch,Stress (kPa){above}", *beside)
     data = tq.read(path)
-    np.testing.assert_allclose(data.stretch, stretch, rtol=1e-7)
-    np.testing.assert_allclose(data.stress, stress / 1000, rtol=1e-7)
+    check_curve(data, stretch, stress / 1000, rtol=1e-7)
 
 
 def test_a_sheet_of_statistics_is_left_out_beside_a_long_test(tmp_path):

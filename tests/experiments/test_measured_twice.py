@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from written_files import by_name, written
+from written_files import by_name, check_curve, written
 
 LENGTH, AREA = 20.0, 10.0  # mm, mm2
 STRAIN = np.linspace(0, 0.3, 31)
@@ -37,8 +37,7 @@ def test_a_strain_of_the_specimen_beside_the_crosshead_is_asked_about(tmp_path, 
     choices = asked(path, **SIZES)
     assert choices == [("displacement", "Crosshead (mm)"), (role, name)]
     specimen = tq.read(path, columns=dict([choices[1]]), area=SIZES["area"])
-    np.testing.assert_allclose(specimen.stretch, STRETCH, rtol=1e-5)
-    np.testing.assert_allclose(specimen.stress, STRESS, rtol=1e-5, atol=1e-9)
+    check_curve(specimen, STRETCH, STRESS, rtol=1e-5, stress_atol=1e-9)
     machine = tq.read(path, columns=dict([choices[0]]), **SIZES)
     np.testing.assert_allclose(machine.stretch, 1 + 1.4 * STRAIN, rtol=1e-5)
 
@@ -67,8 +66,7 @@ def test_tabs_part_names_with_numbers_over_a_row_of_units(tmp_path, names):
     head = "\t".join(names) + "\ns\tmm\tN"
     path = written(tmp_path, head, STRAIN, LENGTH * STRAIN, STRESS * AREA, separator="\t", name="test.txt")
     experiment = tq.read(path, columns={"displacement": names[1], "force": names[2]}, **SIZES)
-    np.testing.assert_allclose(experiment.stretch, STRETCH, rtol=1e-5)
-    np.testing.assert_allclose(experiment.stress, STRESS, rtol=1e-5, atol=1e-9)
+    check_curve(experiment, STRETCH, STRESS, rtol=1e-5, stress_atol=1e-9)
 
 
 def test_of_a_load_and_an_extension_with_and_without_correction_the_corrected_ones_are_read_and_said(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from written_files import written
+from written_files import check_curve, written
 
 L = ramp()
 P = neo_hookean(L)
@@ -25,8 +25,7 @@ def with_sizes(folder, head, columns, separator=","):
 def check(tests, names=("S1", "S2", "S3"), stretch=L, stress=P):
     assert [test.name.upper() for test in tests] == list(names)
     for test in tests:
-        np.testing.assert_allclose(test.stretch, stretch, rtol=1e-6)
-        np.testing.assert_allclose(test.stress, stress, rtol=1e-6, atol=1e-9)
+        check_curve(test, stretch, stress, rtol=1e-6, stress_atol=1e-9)
 
 
 def apart(name, values):

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from written_files import written
+from written_files import check_curve, written
 
 LENGTH, AREA = 20.0, 300.0
 BOTH_WAYS = np.concatenate([np.linspace(1, 1.15, 30), np.linspace(1.15, 0.85, 60)])
@@ -37,8 +37,7 @@ def test_a_load_that_counts_compression_as_positive_is_turned_as_a_whole(tmp_pat
     # Rows at rest, of a preload, and those in tension change their sign, too.
     stress = neo_hookean(stretch) + preload
     data = read(tmp_path, name, deformation(stretch), -AREA * stress, compression_positive=True)
-    np.testing.assert_allclose(data.stretch, stretch, atol=1e-8)
-    np.testing.assert_allclose(data.stress, stress, atol=1e-8)
+    check_curve(data, stretch, stress, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["Gap (mm)", "Displacement (mm)"])
@@ -64,8 +63,7 @@ def test_signs_are_turned_as_asked(tmp_path, turn, sign, sign_of_load, stretch):
     stress = neo_hookean(stretch)
     deformation, force = sign * LENGTH * (stretch - 1), sign_of_load * AREA * stress
     data = read(tmp_path, "Displacement (mm)", deformation, force, turn=turn)
-    np.testing.assert_allclose(data.stretch, stretch, atol=1e-8)
-    np.testing.assert_allclose(data.stress, stress, atol=1e-8)
+    check_curve(data, stretch, stress, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["Displacement (mm)", "Stretch"])
@@ -110,8 +108,7 @@ def test_positions_whose_load_does_not_begin_at_zero_are_read_by_the_zero_of_the
     with pytest.raises(InputError, match="--load-zero first"):
         tq.read(path, dimensions=SIZES)
     data = tq.read(path, dimensions=SIZES, load_zero="first")
-    np.testing.assert_allclose(data.stretch, TENSION, atol=1e-8)
-    np.testing.assert_allclose(data.stress, stress, atol=1e-8)
+    check_curve(data, TENSION, stress, atol=1e-8)
 
 
 def test_negative_numbers_of_a_test_that_is_called_tension_are_asked_about(tmp_path):
@@ -142,8 +139,7 @@ def test_positive_numbers_of_a_specimen_broader_than_long_are_asked_about(tmp_pa
         tq.read(path)
     sizes = {"length": "9.23 mm", "area": f"{area} mm2"}
     data = tq.read(path, compression_positive=True, dimensions=sizes)
-    np.testing.assert_allclose(data.stretch, COMPRESSION, atol=1e-8)
-    np.testing.assert_allclose(data.stress, neo_hookean(COMPRESSION), atol=1e-8)
+    check_curve(data, COMPRESSION, neo_hookean(COMPRESSION), atol=1e-8)
     assert tq.read(path, compression_positive=False).stretch.max() == pytest.approx(1.3)
     path.with_name("Zugversuch.csv").write_text(path.read_text())
     assert tq.read(path.with_name("Zugversuch.csv")).stretch.max() == pytest.approx(1.3)
@@ -204,8 +200,7 @@ def test_compression_that_is_written_positive_is_asked_about_wherever_the_file_s
     with pytest.raises(InputError, match=r"compression.*--compression-positive"):
         tq.read(path)
     data = tq.read(path, compression_positive=True)
-    np.testing.assert_allclose(data.stretch, stretch, atol=1e-9)
-    np.testing.assert_allclose(data.stress, neo_hookean(stretch), atol=1e-9)
+    check_curve(data, stretch, neo_hookean(stretch), atol=1e-9)
 
 
 @pytest.mark.parametrize("above", ["", "Frame: tension and compression\n", "Extension rate: 1 mm/min\n"])

@@ -10,7 +10,7 @@ import pytest
 import tissuq as tq
 from tissuq import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
-from written_files import text_file
+from written_files import check_curve, text_file
 
 LENGTH, THICKNESS = 20.0, 2.0
 WIDTHS = {"A 1": 5.0, "A 2": 4.0}
@@ -75,8 +75,7 @@ def test_every_specimen_has_its_own_sizes(layout, tmp_path):
     tests = tq.read_tests(FILES[layout](tmp_path))
     assert [test.name for test in tests] == list(WIDTHS)
     for test in tests:
-        np.testing.assert_allclose(test.stretch, STRETCH, rtol=1e-6)
-        np.testing.assert_allclose(test.stress, STRESS, rtol=1e-6, atol=1e-9)
+        check_curve(test, STRETCH, STRESS, rtol=1e-6, stress_atol=1e-9)
 
 
 @pytest.mark.parametrize("layout", FILES)
@@ -176,8 +175,7 @@ LINES = {
 @pytest.mark.parametrize("language", LINES)
 def test_sizes_are_recognised_by_the_words_of_standards(language, tmp_path):
     data = tq.read(written(tmp_path, f"{LINES[language]}\n\n{TABLE}{MEASURED}"))
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-6)
-    np.testing.assert_allclose(data.stress, STRESS, rtol=1e-6, atol=1e-9)
+    check_curve(data, STRETCH, STRESS, rtol=1e-6, stress_atol=1e-9)
 
 
 def test_a_height_is_the_length_of_a_cylinder_only(tmp_path):

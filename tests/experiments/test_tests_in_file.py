@@ -12,7 +12,7 @@ from machine_files import MU, neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
-from written_files import text_file
+from written_files import check_curve, text_file
 
 STIFFNESS = {"S1": 1.0, "S2": 1.1, "S3": 1.2}
 SIZES = {"length": "10 mm", "area": "10 mm2"}
@@ -35,8 +35,7 @@ def check(tests, names=STIFFNESS, sizes=(1.0, 1.1, 1.2), stretch=None):
     """Compare tests with neo-Hookean specimens, each so many times as stiff."""
     assert [test.name for test in tests] == list(names)
     for test, size in zip(tests, sizes, strict=True):
-        np.testing.assert_allclose(test.stretch, ramp() if stretch is None else stretch, atol=2e-6)
-        np.testing.assert_allclose(test.stress, size * neo_hookean(test.stretch), atol=2e-6)
+        check_curve(test, ramp() if stretch is None else stretch, size * neo_hookean(test.stretch), atol=2e-6)
 
 
 def one_column_a_specimen(header, names_above=()):
@@ -222,8 +221,7 @@ def pages(*parts, title=""):
 def test_pages_of_one_ramp_are_one_test_to_the_last_row(tmp_path):
     path = written(tmp_path / "a.csv", pages(slice(0, 20), slice(20, 40), slice(40, 59), slice(59, 60)))
     (test,) = read_tests(path)
-    np.testing.assert_allclose(test.stretch, ramp(), atol=1e-6)
-    np.testing.assert_allclose(test.stress, neo_hookean(ramp()), atol=1e-6)
+    check_curve(test, ramp(), neo_hookean(ramp()), atol=1e-6)
     loading_and_unloading = written(tmp_path / "b.csv", pages(slice(0, 60), slice(None, None, -1)))
     assert [test.size for test in read_tests(loading_and_unloading)] == [120]
 
@@ -343,8 +341,7 @@ def check_modes(tests):
     """Compare tests with a neo-Hookean specimen in each of the modes."""
     assert [test.mode.name for test in tests] == [mode for mode, _ in MODES.values()]
     for test, (_, power) in zip(tests, MODES.values(), strict=True):
-        np.testing.assert_allclose(test.stretch, ramp(), atol=2e-6)
-        np.testing.assert_allclose(test.stress, MU * (ramp() - ramp() ** power), atol=2e-6)
+        check_curve(test, ramp(), MU * (ramp() - ramp() ** power), atol=2e-6)
 
 
 @pytest.mark.parametrize("column", ["mode", "Type"])
@@ -557,8 +554,7 @@ def test_curves_that_a_digitizer_names_x_and_y_beneath_their_names_are_read_by_t
         ("Circumferential", "circumferential"),
     ]
     for test, (strain, stress) in zip(tests, curves, strict=True):
-        np.testing.assert_allclose(test.stretch, 1 + strain, atol=2e-6)
-        np.testing.assert_allclose(test.stress, stress / 1e3, atol=2e-6)
+        check_curve(test, 1 + strain, stress / 1e3, atol=2e-6)
     with pytest.raises(InputError, match="several columns may be the stress"):
         tq.read(path, **options)
 

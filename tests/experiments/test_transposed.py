@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from written_files import text_file
+from written_files import check_curve, text_file
 
 STRETCH = ramp(rows=12)
 STRESS = neo_hookean(STRETCH)
@@ -27,8 +27,7 @@ def test_names_in_the_first_column_and_values_along_lines_are_read(tmp_path, sep
     head = [["Liver, 3 months"], ["Thickness (mm)", "2"]] if separator != "," else []
     path = written(tmp_path, *head, line("Stretch", STRETCH), line("Stress (kPa)", 1e3 * STRESS), separator=separator)
     data = tq.read(path)
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-8)
-    np.testing.assert_allclose(data.stress, STRESS, rtol=1e-8, atol=1e-12)
+    check_curve(data, STRETCH, STRESS, rtol=1e-8, stress_atol=1e-12)
     assert "read turned upright" in str(tq.inspect(path))
 
 
@@ -38,8 +37,7 @@ def test_units_may_stand_between_a_name_and_its_values(tmp_path):
     for row, unit in zip(rows, ("s", "mm", "mN"), strict=True):
         row.insert(1, unit)
     data = tq.read(written(tmp_path, *rows, separator=";"), length="20 mm", area="10 mm2")
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-8)
-    np.testing.assert_allclose(data.stress, STRESS, rtol=1e-8, atol=1e-12)
+    check_curve(data, STRETCH, STRESS, rtol=1e-8, stress_atol=1e-12)
 
 
 def test_a_sheet_on_its_side_is_read_and_a_faulty_cell_is_named_by_its_column(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from written_files import text_file
+from written_files import check_curve, text_file
 
 STRETCH = np.linspace(1.0, 1.3, 12)
 STRESS = 100 * (STRETCH - STRETCH**-2)  # kPa
@@ -43,8 +43,7 @@ def written(folder, names, kinds, above="", units=""):
 )
 def test_one_length_and_one_force_are_unambiguous_whatever_their_names(tmp_path, names, kinds):
     data = tq.read_experiment(written(tmp_path, names, kinds), **SIZES)
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-7)
-    np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-7, atol=1e-9)
+    check_curve(data, STRETCH, STRESS * 1e-3, rtol=1e-7, stress_atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -59,15 +58,13 @@ def test_one_length_and_one_force_are_unambiguous_whatever_their_names(tmp_path,
 @pytest.mark.filterwarnings("ignore:check the unit")
 def test_a_stress_and_a_strain_are_told_by_their_units(tmp_path, names, kinds):
     data = tq.read_experiment(written(tmp_path, names, kinds))
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-7)
-    np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-7, atol=1e-9)
+    check_curve(data, STRETCH, STRESS * 1e-3, rtol=1e-7, stress_atol=1e-9)
 
 
 def test_a_row_of_units_tells_as_much_and_its_names_may_be_numbered(tmp_path):
     file = written(tmp_path, "1,Zeit,Weg A,Fz", ["five", "time", "mm", "N"], "Results Table 1", ",(s),(mm),(N)")
     data = tq.read_experiment(file, **SIZES)
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-7)
-    np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-7, atol=1e-9)
+    check_curve(data, STRETCH, STRESS * 1e-3, rtol=1e-7, stress_atol=1e-9)
 
 
 def test_axes_may_be_numbered(tmp_path):

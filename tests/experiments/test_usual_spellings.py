@@ -11,7 +11,7 @@ import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.units import FORCE, LENGTH, stress_unit
-from written_files import written
+from written_files import check_curve, written
 
 L = ramp()
 P = 1e3 * neo_hookean(L)  # kPa
@@ -144,8 +144,7 @@ def test_a_compression_is_a_strain_whose_sign_is_asked_about(tmp_path):
     with pytest.raises(InputError, match="--compression-positive"):
         tq.read(path)
     test = tq.read(path, compression_positive=True)
-    np.testing.assert_allclose(test.stretch, stretch, rtol=1e-6)
-    np.testing.assert_allclose(test.stress, neo_hookean(stretch), rtol=1e-6, atol=1e-9)
+    check_curve(test, stretch, neo_hookean(stretch), rtol=1e-6, stress_atol=1e-9)
 
 
 @pytest.mark.parametrize(
