@@ -1,4 +1,4 @@
-"""Files that tests of reading write, of lines or of columns of numbers, what is read of them, and what refusals say."""
+"""Files that tests of reading write, of lines, columns or cells, what is read of them, and what refusals say."""
 
 from __future__ import annotations
 
@@ -19,6 +19,19 @@ def written(folder, head, *columns, separator=",", name="test.csv", form="{:.12g
     """Return a file of columns beneath lines of text, of which the last has the names of the columns."""
     rows = [separator.join(map(form, row)) for row in zip(*columns, strict=True)]
     return text_file(folder / name, head, *rows, encoding=encoding)
+
+
+def workbook(path, **sheets):
+    """Write rows of cells into the sheets of a workbook, and return it."""
+    openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
 
 
 def by_name(folder, **columns):

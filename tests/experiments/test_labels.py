@@ -12,7 +12,7 @@ from machine_files import neo_hookean
 from tissuq.errors import InputError
 from tissuq.report.tables import write_csv
 from tissuq.report.writer import data_file
-from written_files import text_file
+from written_files import text_file, workbook
 
 STRETCH = np.linspace(1, 1.3, 20)
 FACTORS = {"longitudinal": 1.0, "transverse": 1.5}
@@ -30,16 +30,11 @@ def by_column(tmp_path):
 
 @pytest.fixture
 def by_sheet(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for name, factor in FACTORS.items():
-        sheet = book.create_sheet(f"S1 {name.title()}")
-        sheet.append(["stretch", "stress [kPa]"])
-        for x in STRETCH:
-            sheet.append([x, 1e3 * factor * neo_hookean(x)])
-    book.save(tmp_path / "aorta-frozen.xlsx")
-    return tmp_path / "aorta-frozen.xlsx"
+    sheets = {
+        f"S1 {name.title()}": [["stretch", "stress [kPa]"], *([x, 1e3 * factor * neo_hookean(x)] for x in STRETCH)]
+        for name, factor in FACTORS.items()
+    }
+    return workbook(tmp_path / "aorta-frozen.xlsx", **sheets)
 
 
 @pytest.mark.parametrize("source", ["by_column", "by_sheet"])

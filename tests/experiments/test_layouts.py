@@ -10,7 +10,7 @@ from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
 from tissuq.experiments.units import stress_unit
-from written_files import check_curve, text_file
+from written_files import check_curve, text_file, workbook
 
 SIZES = {"length": "20 mm", "area": "10 mm2"}
 STRETCH = ramp()
@@ -294,21 +294,10 @@ def test_results_typed_beside_the_rows_are_no_cells_of_them(tmp_path, above, res
 
 
 def test_a_sheet_of_statistics_is_left_out_beside_a_long_test(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    sheet, statistics = book.active, book.create_sheet("Statistik")
-    sheet.title = "Probe 1"
-    for row in (["Stretch", "Stress (kPa)"], *([1 + k / 200, float(k)] for k in range(60))):
-        sheet.append(row)
-    for row in (
-        ["Serie", "Fm", "dL bei Fm"],
-        ["n = 2", "N", "mm"],
-        ["x", 3.1, 2.2],
-        ["s", 0.4, 0.3],
-        ["v", 12.9, 13.6],
-    ):
-        statistics.append(row)
-    book.save(path := tmp_path / "series.xlsx")
+    rows = [["Stretch", "Stress (kPa)"], *([1 + k / 200, float(k)] for k in range(60))]
+    head = [["Serie", "Fm", "dL bei Fm"], ["n = 2", "N", "mm"]]
+    statistics = [*head, ["x", 3.1, 2.2], ["s", 0.4, 0.3], ["v", 12.9, 13.6]]
+    path = workbook(tmp_path / "series.xlsx", **{"Probe 1": rows, "Statistik": statistics})
     with pytest.warns(UserWarning, match="sheet 'Statistik' is no test: it is short"):
         (test,) = tq.read_tests(path)
     assert len(test) == 60

@@ -10,7 +10,7 @@ import pytest
 import tissuq as tq
 from tissuq import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
-from written_files import check_curve, text_file
+from written_files import check_curve, text_file, workbook
 
 LENGTH, THICKNESS = 20.0, 2.0
 WIDTHS = {"A 1": 5.0, "A 2": 4.0}
@@ -51,20 +51,10 @@ def table_above(folder, units="\n;mm;mm;mm"):
 
 
 def sheet_of_results(folder):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    sheet = book.active
-    sheet.title = "Ergebnisse"
-    for row in ([None, "L0", "b0", "a0"], ["Legende", "mm", "mm", "mm"], ["A 1", 20, 5, 2], ["A 2", 20, 4, 2]):
-        sheet.append(row)
-    for name, width in WIDTHS.items():
-        sheet = book.create_sheet(name)
-        sheet.append(["Standardweg (mm)", "Standardkraft (N)"])
-        for row in zip((LENGTH * (STRETCH - 1)).tolist(), forces(width).tolist(), strict=True):
-            sheet.append(row)
-    path = folder / "book.xlsx"
-    book.save(path)
-    return path
+    results = [[None, "L0", "b0", "a0"], ["Legende", "mm", "mm", "mm"], ["A 1", 20, 5, 2], ["A 2", 20, 4, 2]]
+    head, moved = ["Standardweg (mm)", "Standardkraft (N)"], LENGTH * (STRETCH - 1)
+    measured = {name: [head, *zip(moved, forces(width), strict=True)] for name, width in WIDTHS.items()}
+    return workbook(folder / "book.xlsx", Ergebnisse=results, **measured)
 
 
 FILES = {"columns": columns_of_sizes, "table above": table_above, "sheet": sheet_of_results}

@@ -6,7 +6,7 @@ import pytest
 import tissuq as tq
 from machine_files import cycles, neo_hookean
 from tissuq.errors import InputError
-from written_files import text_file
+from written_files import text_file, workbook
 
 COLUMNS = "Time (s),Strain (%),Stress (kPa)"
 SUMMARIES = {
@@ -101,17 +101,10 @@ def test_a_blank_line_after_every_row_is_no_gap(tmp_path):
 
 @pytest.mark.parametrize("label", ["Mean", None])
 def test_a_summary_of_a_sheet_is_left_out(tmp_path, label):
-    openpyxl = pytest.importorskip("openpyxl")
-    values, book = measured(), openpyxl.Workbook()
-    sheet = book.active
-    sheet.append(COLUMNS.split(","))
-    for row in values.tolist():
-        sheet.append(row)
-    sheet.append([])
-    for statistic in (fmean, stdev):
-        sheet.append([label, *map(statistic, values[:, 1:].T.tolist())])
-    book.save(tmp_path / "test.xlsx")
-    assert len(tq.read_experiment(tmp_path / "test.xlsx")) == len(values)
+    values = measured()
+    summary = [[label, *map(statistic, values[:, 1:].T.tolist())] for statistic in (fmean, stdev)]
+    path = workbook(tmp_path / "test.xlsx", Sheet=[COLUMNS.split(","), *values.tolist(), [], *summary])
+    assert len(tq.read_experiment(path)) == len(values)
 
 
 def test_a_number_beyond_all_bounds_at_the_end_is_no_statistic(tmp_path):

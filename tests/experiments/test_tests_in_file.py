@@ -12,7 +12,7 @@ from machine_files import MU, neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
-from written_files import check_curve, text_file
+from written_files import check_curve, text_file, workbook
 
 STIFFNESS = {"S1": 1.0, "S2": 1.1, "S3": 1.2}
 SIZES = {"length": "10 mm", "area": "10 mm2"}
@@ -247,18 +247,6 @@ def test_a_word_among_the_numbers_is_a_bad_cell_and_no_second_table(tmp_path):
         read_tests(written(tmp_path / "a.csv", rows))
 
 
-def book(path, **sheets):
-    openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
-    workbook = openpyxl.Workbook()
-    workbook.remove(workbook.active)
-    for name, rows in sheets.items():
-        sheet = workbook.create_sheet(name)
-        for row in rows:
-            sheet.append(row)
-    workbook.save(path)
-    return path
-
-
 def sheet(names, deformation, stress):
     return [names, *([float(a), float(b)] for a, b in zip(deformation, stress, strict=True))]
 
@@ -269,7 +257,7 @@ RESULTS = [["Specimen", "Maximum"], [1, 2.0], [2, 3.0]]
 
 
 def test_sheets_are_tests_with_the_modes_that_they_say(tmp_path):
-    path = book(tmp_path / "liver.xlsx", Results=RESULTS, tension=TENSION, Blatt3=SHEAR)
+    path = workbook(tmp_path / "liver.xlsx", Results=RESULTS, tension=TENSION, Blatt3=SHEAR)
     tests = find_tests_in_file(path)
     assert [(test.name, test.options["mode"], test.reading.mode_source) for test in tests] == [
         ("tension", "uniaxial", "'tension'"),
@@ -285,20 +273,20 @@ def test_sheets_are_tests_with_the_modes_that_they_say(tmp_path):
 
 def test_a_long_table_that_is_not_understood_is_no_mere_results(tmp_path):
     unknown = sheet(["alpha", "beta"], ramp(), ramp())
-    path = book(tmp_path / "liver.xlsx", tension=TENSION, other=unknown)
+    path = workbook(tmp_path / "liver.xlsx", tension=TENSION, other=unknown)
     with pytest.raises(InputError, match=r"sheet 'other': no column is recognised.*read 'tension': --sheet 'tension'"):
         read_tests(path)
     assert len(read_tests(path, sheet="tension")) == 1
 
 
 def test_one_sheet_that_holds_a_test_is_the_test_of_the_file(tmp_path):
-    (test,) = find_tests_in_file(book(tmp_path / "liver.xlsx", Results=RESULTS, Data=TENSION))
+    (test,) = find_tests_in_file(workbook(tmp_path / "liver.xlsx", Results=RESULTS, Data=TENSION))
     assert test.options["sheet"] == "Data"
 
 
 def test_options_that_only_some_tests_need_are_for_these(tmp_path):
     force = sheet(["Displacement [mm]", "Force [N]"], 10 * (1 - ramp()), -10 * neo_hookean(2 - ramp()))
-    path = book(tmp_path / "liver.xlsx", compression=[[force[0][0], force[0][1]], *force[1:]], shear=SHEAR)
+    path = workbook(tmp_path / "liver.xlsx", compression=[[force[0][0], force[0][1]], *force[1:]], shear=SHEAR)
     tests = find_tests_in_file(path, dimensions=SIZES, compression_positive=True)
     assert [(test.options["dimensions"], test.options["compression_positive"]) for test in tests] == [
         (SIZES, True),
@@ -310,7 +298,7 @@ def test_options_that_only_some_tests_need_are_for_these(tmp_path):
 
 
 def test_a_mode_that_only_some_tests_say_is_asked_for(tmp_path):
-    path = book(tmp_path / "liver.xlsx", tension=TENSION, Blatt3=TENSION)
+    path = workbook(tmp_path / "liver.xlsx", tension=TENSION, Blatt3=TENSION)
     with pytest.raises(InputError, match=r"'Blatt3' does not say in which loading mode.*--mode once for all 2 tests"):
         read_tests(path)
     assert len(read_tests(path, mode="equibiaxial")) == 2
@@ -560,15 +548,8 @@ def test_curves_that_a_digitizer_names_x_and_y_beneath_their_names_are_read_by_t
 
 
 def test_sheets_named_after_directions_are_read_in_the_same_loading_mode(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for sheet, title in ((book.active, "Axial"), (book.create_sheet(), "Circ")):
-        sheet.title = title
-        sheet.append(["strain", "stress [kPa]"])
-        for stretch in ramp():
-            sheet.append([stretch - 1, 1e3 * neo_hookean(stretch)])
-    book.save(tmp_path / "aorta.xlsx")
-    tests = find_tests_in_file(tmp_path / "aorta.xlsx")
+    of_direction = sheet(["strain", "stress [kPa]"], ramp() - 1, 1e3 * neo_hookean(ramp()))
+    tests = find_tests_in_file(workbook(tmp_path / "aorta.xlsx", Axial=of_direction, Circ=of_direction))
     assert [(test.reading.experiment.direction, test.options["mode"]) for test in tests] == [
         ("axial", "uniaxial"),
         ("circ", "uniaxial"),

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from written_files import check_curve, text_file
+from written_files import check_curve, text_file, workbook
 
 STRETCH = ramp(rows=12)
 STRESS = neo_hookean(STRETCH)
@@ -41,12 +41,8 @@ def test_units_may_stand_between_a_name_and_its_values(tmp_path):
 
 
 def test_a_sheet_on_its_side_is_read_and_a_faulty_cell_is_named_by_its_column(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for row in (["Stretch", *STRETCH], ["Stress [kPa]", *(1e3 * STRESS)]):
-        book.active.append(row)
-    book.save(tmp_path / "test.xlsx")
-    np.testing.assert_allclose(tq.read(tmp_path / "test.xlsx").stress, STRESS, rtol=1e-12, atol=1e-15)
+    book = workbook(tmp_path / "test.xlsx", Sheet=[["Stretch", *STRETCH], ["Stress [kPa]", *(1e3 * STRESS)]])
+    np.testing.assert_allclose(tq.read(book).stress, STRESS, rtol=1e-12, atol=1e-15)
     path = written(tmp_path, line("Stretch", STRETCH), [*line("Stress (kPa)", 1e3 * STRESS[:5]), "1e999", *["9"] * 6])
     with pytest.raises(InputError, match=r"column 7, column 'Stress \(kPa\)': '1e999' is too large"):
         tq.read(path)
