@@ -7,17 +7,15 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.measured_rows import find_cycles
 from tissuq.experiments.reading.read import read_experiment
-from written_files import message
+from written_files import message, text_file
 
 
 @pytest.fixture
 def written(tmp_path):
     def write(stretch, **columns):
-        path = tmp_path / "test.csv"
         columns = {"stretch": stretch, "stress_MPa": neo_hookean(np.asarray(stretch)), **columns}
         rows = "\n".join(",".join(map(str, row)) for row in zip(*columns.values(), strict=True))
-        path.write_text(",".join(columns) + "\n" + rows + "\n")
-        return path
+        return text_file(tmp_path / "test.csv", ",".join(columns) + "\n" + rows + "\n")
 
     return write
 

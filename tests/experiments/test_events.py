@@ -8,7 +8,7 @@ import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.experiments import datasets
 from tissuq.experiments.reading.disturbances import ends_of_rests, find_holds, find_rupture
-from written_files import check_curve, written
+from written_files import check_curve, text_file, written
 
 LAWS = {
     "neo-hookean": lambda share: 1.4 * share - (1.4 * share) ** 2 / 3,
@@ -231,9 +231,8 @@ def test_until_peak_goes_with_a_cycle_and_a_preload(inspected):
 
 
 def test_a_stress_that_rests_while_the_specimen_deforms_is_in_doubt(tmp_path):
-    path = tmp_path / "creep.csv"
     rows = [f"{10 + np.log1p(t):.4f},{5 + 0.01 * np.sin(t):.4f}" for t in range(40)]
-    path.write_text("\n".join(["Strain (%),Stress (kPa)", *rows]))
+    path = text_file(tmp_path / "creep.csv", "Strain (%),Stress (kPa)", *rows)
     text = " ".join(str(tq.inspect(path)).split())
     assert (
         "the stress stays between 4.99 and 5.01 kPa while the stretch goes from 1.1 to 1.137: the specimen creeps"

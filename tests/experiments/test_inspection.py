@@ -113,9 +113,8 @@ def test_a_reading_that_strays_as_others_do_is_no_preload_and_the_zero_is_that_o
 def test_slack_under_a_load_zero_is_told_with_it(tmp_path, slack, words):
     stretch = np.linspace(1, 1.4, 41)
     stress = 1e3 * neo_hookean(np.maximum(stretch - slack, 1.0)) + 20 + np.random.default_rng(5).normal(0, 1, 41)
-    path = tmp_path / "zero.csv"
     rows = zip(stretch.tolist(), stress.tolist(), strict=True)
-    path.write_text("stretch,stress [kPa]\n" + "".join(f"{x:.4f},{y:.2f}\n" for x, y in rows))
+    path = text_file(tmp_path / "zero.csv", "stretch,stress [kPa]\n" + "".join(f"{x:.4f},{y:.2f}\n" for x, y in rows))
     (said,) = [text for text in tq.inspect(path).warnings if "the stress is already" in text]
     assert words in said
     assert ("and slack: without it the first" in said) == bool(slack)

@@ -352,9 +352,8 @@ def test_sizes_with_units_in_a_sheet_of_their_own_make_no_table(tmp_path):
 
 
 def test_curves_of_a_picture_are_asked_about_once(tmp_path):
-    path = tmp_path / "picture.csv"
     rows = [f"{1 + x:.6f},{y:.6f},{1 + 2 * x:.6f},{y:.6f}" for x, y in CURVE]
-    path.write_text("\n".join(["Control,,Treated,", "X,Y,X,Y", *rows]), encoding="utf-8")
+    path = text_file(tmp_path / "picture.csv", "Control,,Treated,", "X,Y,X,Y", *rows)
     with pytest.raises(tq.InputError, match="--column stretch=X --column stress=Y --stress-unit kPa"):
         read_tests(path)
     tests = read_tests(path, stretch="X", stress="Y", unit="kPa")

@@ -166,9 +166,8 @@ def test_a_size_that_is_not_needed_is_not_used(tmp_path):
 
 
 def test_a_table_of_results_is_passed_over_only_for_a_far_longer_one(tmp_path):
-    path = tmp_path / "test.csv"
     head = "Maximum strain,Maximum stress\n0.5,2.5\n\nstrain,stress [MPa]\n"
-    path.write_text(head + "".join(f"{k / 100},{k / 50}\n" for k in range(30)))
+    path = text_file(tmp_path / "test.csv", head + "".join(f"{k / 100},{k / 50}\n" for k in range(30)))
     assert len(read_experiment(path)) == 30
     path.write_text(head + "0.0,0.0\n0.1,0.5\n")
     assert "no column is recognised" in message(path)

@@ -55,8 +55,7 @@ def test_columns_are_known_by_names_wherever_they_stand(tmp_path, kind):
     ["strain stress_kPa", "Sig1\tStrain (%)\nSig2\tStress (kPa)"],
 )
 def test_names_that_may_be_those_of_other_columns_are_not_taken(tmp_path, head):
-    path = tmp_path / "test.txt"
     separator = "\t" if "\t" in head else " "
-    path.write_text(f"{head}\n{table(separator, texts(STRAIN), texts(STRESS), texts(STRETCH))}", encoding="utf-8")
+    path = text_file(tmp_path / "test.txt", f"{head}\n{table(separator, texts(STRAIN), texts(STRESS), texts(STRETCH))}")
     with pytest.raises(InputError, match=r"columns have no names|has 3 cells, but line 2 with the column names has 2"):
         tq.read(path)

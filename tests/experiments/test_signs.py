@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from written_files import check_curve, written
+from written_files import check_curve, text_file, written
 
 LENGTH, AREA = 20.0, 300.0
 BOTH_WAYS = np.concatenate([np.linspace(1, 1.15, 30), np.linspace(1.15, 0.85, 60)])
@@ -131,10 +131,9 @@ SECTION = "Fläche;333,6;mm2\nMesslänge;9,23;mm\n"
     ids=["disc", "block", "area alone"],
 )
 def test_positive_numbers_of_a_specimen_broader_than_long_are_asked_about(tmp_path, head, area):
-    path = tmp_path / "Leber.csv"
     columns = 9.23 * (1 - COMPRESSION), -area * neo_hookean(COMPRESSION)
     rows = [f"{d:.9f};{f:.9f}".replace(".", ",") for d, f in zip(*columns, strict=True)]
-    path.write_text("\n".join([f"{head}Weg (mm);Kraft (N)", *rows]))
+    path = text_file(tmp_path / "Leber.csv", f"{head}Weg (mm);Kraft (N)", *rows)
     with pytest.raises(InputError, match=r"broader \(.* than long \(9.23 mm\).*--compression-positive.*--tension-pos"):
         tq.read(path)
     sizes = {"length": "9.23 mm", "area": f"{area} mm2"}

@@ -11,7 +11,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.read import read_experiment
-from written_files import check_curve, message, written
+from written_files import check_curve, message, text_file, written
 
 STRETCH = np.array([[1.0, 1.0], [1.1, 1.05], [1.2, 1.1], [1.3, 1.15]])
 STRESS = mooney_rivlin(STRETCH)
@@ -213,10 +213,9 @@ def test_an_axis_that_is_held_at_its_length_is_read(tmp_path):
 
 
 def test_a_first_axis_without_a_number_is_read_beside_the_second(tmp_path):
-    path = tmp_path / "sheet.csv"
     head = "mode,stretch,stress_MPa,stretch_2,stress_2_MPa"
     rows = "biaxial,1,0,1,0\nbiaxial,1.1,2.1,1.05,0.8\nbiaxial,1.2,4.5,1.1,1.7\n"
-    path.write_text(f"{head}\n{rows}", encoding="utf-8")
+    path = text_file(tmp_path / "sheet.csv", f"{head}\n{rows}")
     data = read_experiment(path)
     assert data.stretch.tolist() == [[1, 1], [1.1, 1.05], [1.2, 1.1]]
     assert [curve.stress.tolist() for curve in data.curves] == [[0, 2.1, 4.5], [0, 0.8, 1.7]]
@@ -226,9 +225,8 @@ def test_a_first_axis_without_a_number_is_read_beside_the_second(tmp_path):
 
 
 def test_an_inspection_says_of_each_axis_what_its_ranges_are(tmp_path):
-    path = tmp_path / "sheet.csv"
     rows = "".join(f"{1 + k / 20},{k * 3.0},{1 + k / 10},{k * 4.0}\n" for k in range(8))
-    path.write_text(f"stretch,stress_kPa,stretch_2,stress_2_kPa\n{rows}")
+    path = text_file(tmp_path / "sheet.csv", f"stretch,stress_kPa,stretch_2,stress_2_kPa\n{rows}")
     found = tq.inspect(path, mode="biaxial")
     assert "axis 1: stretch 1 to 1.35, stress 0 to 21 kPa; axis 2: stretch 1 to 1.7, stress 0 to 28 kPa" in found.line
     text = " ".join(str(found).split())
