@@ -321,8 +321,7 @@ def test_a_unit_in_every_cell_of_a_column_is_its_unit(tmp_path, separator, unit)
         UserWarning, match="'stress': the cells are numbers with their unit, and were read as numbers in"
     ):
         data = tq.read(path)
-    np.testing.assert_allclose(data.stretch, [1 + x for x, _ in CURVE], rtol=1e-9)
-    np.testing.assert_allclose(data.stress, [y * stress_unit(unit).to_mpa for _, y in CURVE])
+    check_curve(data, [1 + x for x, _ in CURVE], [y * stress_unit(unit).to_mpa for _, y in CURVE], rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from written_files import text_file, written
+from written_files import check_curve, text_file, written
 
 L = ramp()
 P = 1e3 * neo_hookean(L)  # kPa
@@ -20,8 +20,7 @@ N = P * 4e-3  # N
 def check(path, expected="uniaxial", stretch=L, stress=P, **options):
     (test,) = tq.read_tests(path, **options)
     assert test.mode.name == expected
-    np.testing.assert_allclose(test.stretch, stretch, rtol=1e-5, atol=1e-7)
-    np.testing.assert_allclose(test.stress, 1e-3 * stress, rtol=1e-5, atol=1e-9)
+    check_curve(test, stretch, 1e-3 * stress, rtol=1e-5, atol=1e-9)
 
 
 @pytest.mark.parametrize(

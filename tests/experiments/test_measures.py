@@ -205,15 +205,13 @@ def test_names_that_say_the_measure_need_no_option(tmp_path, strain, stress, exp
     values = components(UNIAXIAL, *expected, (0, 0))
     file = by_name(tmp_path, **{strain: 100 * values[0], stress: values[1]})
     data = read_experiment(file)
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
-    np.testing.assert_allclose(data.stress, P11, atol=1e-9)
+    check_curve(data, STRETCH, P11, rtol=1e-9, stress_atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["F11", "F_11 [-]", "Fxx", "lambda11", "λ_11"])
 def test_a_diagonal_component_of_the_deformation_gradient_is_a_stretch(tmp_path, name):
     data = read_experiment(by_name(tmp_path, **{name: STRETCH, "P11 [MPa]": P11}))
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
-    np.testing.assert_allclose(data.stress, P11, atol=1e-12)
+    check_curve(data, STRETCH, P11, rtol=1e-9, stress_atol=1e-12)
 
 
 def test_what_is_called_like_a_component_but_has_a_unit_of_force_is_a_force(tmp_path):
@@ -227,8 +225,7 @@ def test_components_of_both_axes_are_a_biaxial_test(tmp_path):
     names = ("F11", "F22", "Cauchy stress T11 [MPa]", "Cauchy stress T22 [MPa]")
     file = by_name(tmp_path, **dict(zip(names, (*points.T, *(points**2 - 1).T), strict=True)))
     data = read_experiment(file, mode="biaxial")
-    np.testing.assert_allclose(data.stretch, points, rtol=1e-9)
-    np.testing.assert_allclose(data.stress, points - 1 / points, atol=1e-9)
+    check_curve(data, points, points - 1 / points, rtol=1e-9, stress_atol=1e-9)
 
 
 def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
@@ -237,8 +234,7 @@ def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
     file = by_name(tmp_path, **columns)
     for strain_type, stress_type in product((None, "true"), (None, "cauchy")):
         data = read_experiment(file, strain_type=strain_type, stress_type=stress_type)
-        np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
-        np.testing.assert_allclose(data.stress, P11, atol=1e-12)
+        check_curve(data, STRETCH, P11, rtol=1e-9, stress_atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -326,8 +322,7 @@ def test_no_other_measure_is_read_as_the_engineering_one_without_a_word(tmp_path
         data = read_experiment(by_name(tmp_path, **{strain: factor * values[0], stress: values[1]}))
     except InputError:
         return
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
-    np.testing.assert_allclose(data.stress, P11, atol=1e-9)
+    check_curve(data, STRETCH, P11, rtol=1e-9, stress_atol=1e-9)
 
 
 @pytest.mark.parametrize(

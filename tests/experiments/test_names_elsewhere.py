@@ -6,7 +6,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from written_files import text_file
+from written_files import check_curve, text_file
 
 STRETCH = np.linspace(1, 1.4, 20)
 STRAIN, STRESS = 100 * (STRETCH - 1), 1e3 * neo_hookean(STRETCH)
@@ -22,8 +22,7 @@ def texts(values):
 
 def check(path):
     data = tq.read(path)
-    np.testing.assert_allclose(data.stretch, STRETCH, atol=1e-7)
-    np.testing.assert_allclose(data.stress, 1e-3 * STRESS, atol=1e-8)
+    check_curve(data, STRETCH, 1e-3 * STRESS, atol=1e-8)
 
 
 NUMBERS = [f'"{number}"' for number in range(1, len(STRETCH) + 1)]

@@ -58,8 +58,7 @@ def test_a_table_whose_first_column_names_specimens_stands_upright(tmp_path):
 def test_exponents_of_fortran_are_read(tmp_path, letter):
     rows = [[f"{value:.8E}".replace("E", letter) for value in row] for row in zip(STRETCH, 1e3 * STRESS, strict=True)]
     data = tq.read(written(tmp_path, ["Stretch", "Stress_2D-10 (kPa)"], *rows), stress=2)
-    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-8)
-    np.testing.assert_allclose(data.stress, STRESS, rtol=1e-7, atol=1e-12)
+    check_curve(data, STRETCH, STRESS, rtol=1e-8, stress_atol=1e-12)
 
 
 def test_a_column_of_labels_that_are_names_of_quantities_stands_upright(tmp_path):
