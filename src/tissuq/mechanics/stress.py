@@ -64,17 +64,17 @@ def engineering_stress(
     ----------
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
     """
-    _refuse_names(material=material, mode=mode)
+    _check_kinds(material=material, loading_mode=mode)
     return stresses_at(material, mode.at(stretch), values)
 
 
-def _refuse_names(**objects: object) -> None:
-    for what, named in objects.items():
-        if isinstance(named, str):
-            kinds = {"material": "materials", "mode": "loading_modes"}[what]
-            raise InputError(
-                f"{what} must be an object, not a name: tissuq.{kinds}()['{named}'](). tissuq.simulate takes names."
-            )
+def _check_kinds(**objects: object) -> None:
+    for what, value in objects.items():
+        if isinstance(value, str):
+            made = f"tissuq.{what}s()['{value}']()"
+            raise InputError(f"{what} must be an object, not a name: {made}. tissuq.simulate takes names.")
+        if not isinstance(value, Material if what == "material" else LoadingMode | Path):
+            raise InputError(f"{what} must be an object, such as one of tissuq.{what}s(), not {value!r:.80}.")
 
 
 def stresses_at(material: Material, states: States, values: ArrayLike) -> FloatArray:
@@ -297,7 +297,7 @@ def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:
 
 def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
     """Return the shear modulus at the reference, in MPa: the initial slope in simple shear."""
-    _refuse_names(material=material)
+    _check_kinds(material=material)
     with _explained(material):
         return float(_initial_slope(material)(np.asarray(values, dtype=np.float64)))
 

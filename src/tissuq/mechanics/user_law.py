@@ -82,6 +82,8 @@ class FunctionLaw(Material):
     function: Callable[..., Any]
 
     def __post_init__(self) -> None:
+        if not hasattr(self.function, "__name__"):
+            raise InputError(f"a law is a function, not {self.function!r:.80}. {HOW_TO_WRITE}.")
         name, names = self.function.__name__, tuple(inspect.signature(self.function).parameters)
         if not any(names[: len(start)] == start and len(names) > len(start) for start in ARGUMENTS):
             raise InputError(f"the law '{name}' has the arguments {', '.join(names) or 'none'}. {HOW_TO_WRITE}.")

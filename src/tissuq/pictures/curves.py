@@ -16,6 +16,7 @@ from tissuq.experiments.reading.tube import SAME_STRETCH, rows_at_each_stretch
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
+from tissuq.parameters.checks import check_probability
 from tissuq.prediction.bands import Band, inside_band, predict_bands
 from tissuq.prediction.moments import drawn_curves
 from tissuq.prediction.scores import root_mean_square
@@ -125,6 +126,7 @@ def described(
     solution: Solution, prob: float = 0.95, inside: Sequence[BoolArray | None] | None = None
 ) -> list[Described]:
     """Return what a posterior says of every measured curve, of which it may be known what is inside its band."""
+    check_probability(prob)
     curves = solution.model.experiment.curves
     pairs = zip(curves, inside or [None] * len(curves), strict=True)
     return [Described(solution, curve, prob, is_inside) for curve, is_inside in pairs]

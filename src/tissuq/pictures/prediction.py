@@ -16,6 +16,7 @@ from tissuq.drawing.panels import Panels, limits_of, within
 from tissuq.drawing.pieces import band, cut_off, line, outside, points
 from tissuq.drawing.style import BAND, BASE, INK, relative_size
 from tissuq.errors import InputError, ModelError
+from tissuq.experiments.checked_arrays import checked_points
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import values_of_control
 from tissuq.experiments.units import StressUnit
@@ -117,7 +118,7 @@ def predictions(
         When the points are none of the mode, must be given, or the material has no stress there.
     """
     if stretch is not None:
-        return _predictions(solution, mode, np.atleast_1d(np.asarray(stretch, dtype=np.float64)), prob)
+        return _predictions(solution, mode, checked_points(mode, np.atleast_1d(stretch)), prob)
     for reach in LESSER_REACHES:
         with suppress(ModelError):
             return _predictions(solution, mode, stretches_to_show(solution, mode, reach), prob)

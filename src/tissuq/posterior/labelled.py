@@ -15,7 +15,7 @@ from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
 from tissuq.model.prior_draws import draw_from_prior
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.parameters.checks import check_count, check_probability
+from tissuq.parameters.checks import check_count, check_probability, one_or_several
 from tissuq.parameters.parameter import Parameter
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import LeaveOneOut, pointwise_log_likelihood, replicate_data, stride
@@ -131,7 +131,7 @@ def summaries(
     model = solution.model
     check_probability(prob)
     symbols = tuple(parameter.symbol for parameter in model.reported_parameters)
-    wanted = symbols if parameters is None else tuple(parameters)
+    wanted = symbols if parameters is None else one_or_several(parameters, str, "parameters must be symbols")
     unknown = [symbol for symbol in wanted if symbol not in symbols]
     if unknown:
         raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(symbols)}.")

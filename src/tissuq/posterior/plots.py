@@ -14,6 +14,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.solution import Solution
+from tissuq.parameters.checks import one_or_several
 from tissuq.pictures.answer import answer, discrepancy_shares
 from tissuq.pictures.curves import described, has_discrepancy
 from tissuq.pictures.parameters import MODULUS, marginal_of, marginals, parameters_to_show, ridges
@@ -114,7 +115,8 @@ class PosteriorPlots:
         ax, unit, prob
             As of `plot`; the bar is the highest-density interval of this probability.
         """
-        names = parameters_to_show(self.solution) if parameters is None else list(parameters)
+        shown = parameters_to_show(self.solution) if parameters is None else parameters
+        names = one_or_several(shown, str, "parameters must be symbols")
         if not names:
             raise InputError("parameters is empty: name some, or leave it out.")
         for name in names:

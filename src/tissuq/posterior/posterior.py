@@ -30,7 +30,7 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
 from tissuq.next_test.targets import Target
-from tissuq.parameters.checks import checked_path
+from tissuq.parameters.checks import check_probability, check_switches, checked_path
 from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.drawn_materials import Sampling, drawn_ensemble
@@ -458,6 +458,8 @@ class Posterior(PosteriorPlots):
 
     def inside_bands(self, *, discrepancy: bool = True, prob: float = 0.95) -> tuple[BoolArray, ...]:
         """Return which measurements are inside their predictive band, an array for every curve of the experiment."""
+        check_switches(discrepancy=discrepancy)
+        check_probability(prob)
         key = (discrepancy, prob)
         if key not in self._inside:
             options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob}

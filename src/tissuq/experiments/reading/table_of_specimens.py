@@ -17,6 +17,7 @@ from tissuq.experiments.reading.stated_sizes import StatedSize, numbered, sizes_
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
+from tissuq.parameters.checks import checked_path
 
 EXAMPLE_OF_SIZES = "specimen,length [mm],width [mm],thickness [mm]"
 """A first line of a table of sizes."""
@@ -103,6 +104,7 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     ...     tq.read_sizes(table)
     {'A': {'width': '10.2 mm', 'thickness': '3.1 mm', 'length': '20.0 mm'}}
     """
+    path = checked_path(path, "the file of a table of sizes")
     table, labels = table_of_specimens(path, (), "sizes", EXAMPLE_OF_SIZES)
     headings = {column: heading(name) for column, name in enumerate(table.names) if column}
     rows = table.cells()
