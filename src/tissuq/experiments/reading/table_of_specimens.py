@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from warnings import warn
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.dimensions import WAYS, Dimension, agree, quantity_of, sections_of
@@ -135,19 +136,26 @@ class TableOfSizes:
         """Return those in a file."""
         return cls(str(path), read_sizes(path))
 
-    def dimensions(self, names: Collection[str], test: str, given: Mapping[str, str] | None) -> Mapping[str, str]:
+    def dimensions(
+        self, names: Collection[str], test: str, given: Mapping[str, str] | None, folder: str = ""
+    ) -> Mapping[str, str]:
         """Return those of the specimen of a test, and in place of them what is given.
 
-        It is the first that has one of some names; capitals and blanks are the same.
+        It is the first that has one of some names; capitals and blanks are the same. Where none has, it is the one
+        whose name is that of the folder of the test, and a warning says so.
 
         Raises
         ------
         InputError
-            When none of the rows is of it.
+            When none of the rows is of it, or several are that differ in capitals and blanks alone.
         """
-        by_name = {plain(name): dimensions for name, dimensions in self.sizes.items()}
-        found = (self.sizes.get(name, by_name.get(plain(name))) for name in names)
-        of_table = next((dimensions for dimensions in found if dimensions is not None), None)
+        of_table = next((dimensions for name in names if (dimensions := self._row(name)) is not None), None)
+        if of_table is None and (of_table := self._row(folder)) is not None:
+            warn(
+                f"{self.file} has no row for {test}: its sizes are taken from the row of its folder, '{folder}'. If it "
+                "is of another specimen, name the file, or its specimen, in the first column.",
+                stacklevel=2,
+            )
         if of_table is None:
             raise InputError(
                 f"{self.file} has no row for {test}: its rows are of {', '.join(self.sizes)}. Name the file, or its "
@@ -155,6 +163,16 @@ class TableOfSizes:
             )
         replaced = WAYS if given and WAYS & given.keys() else frozenset()
         return {**{name: size for name, size in of_table.items() if name not in replaced}, **(given or {})}
+
+    def _row(self, name: str) -> Mapping[str, str] | None:
+        """Return the sizes of the specimen of that name, or of the only one but for capitals and blanks; or None."""
+        alike = [name] if name in self.sizes else [label for label in self.sizes if plain(label) == plain(name)]
+        if len(alike) > 1:
+            raise InputError(
+                f"{self.file} has rows for {' and '.join(map(repr, alike))}, and both may be '{name}': name one of "
+                "them exactly so."
+            )
+        return self.sizes[alike[0]] if alike else None
 
 
 def _sizes_of_row(table: Table, row: int, cells: Sequence[str], headings: Mapping[int, Heading]) -> dict[str, str]:
@@ -165,7 +183,7 @@ def _sizes_of_row(table: Table, row: int, cells: Sequence[str], headings: Mappin
             continue
         quantity, measurement = numbered(named.quantity)
         of_cell = sizes_of_text(Heading(quantity, named.unit), cells[column], "", "", measurement)
-        if not of_cell:
+        if not any(size.is_of(name, is_cylinder=True) for size in of_cell for name in DIMENSION_NAMES):
             raise InputError(
                 f"{table.place(column, row)}: '{cells[column]}' is no size with a unit. Write a number above zero, and "
                 "the unit into the name of the column, such as 'width [mm]'."
