@@ -7,6 +7,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from openpyxl import Workbook
 
 import tissuq as tq
 from command_line import done_in, run_in
@@ -95,12 +96,29 @@ def test_a_height_is_the_length_where_no_other_is_named(tmp_path):
         (["specimen,age", "A,40"], "'age' is known as a size"),
         ([HEADER, "A,20,10,3", "A.csv,20,10,3"], "specimen 'A' has several rows"),
         ([HEADER], "holds no sizes"),
+        ([HEADER, "A,20,10,3", ",20,10.4,3"], "line 3, column 'specimen': the row names no specimen"),
     ],
 )
 def test_what_is_no_table_of_sizes_is_refused(tmp_path, lines, words):
     with pytest.raises(tq.InputError) as refusal:
         tq.read_sizes(write(tmp_path / "sizes.csv", *lines))
     assert words in str(refusal.value)
+
+
+def test_rows_without_cells_stand_between_groups(tmp_path):
+    table = write(tmp_path / "sizes.csv", HEADER, "A,20,10,3", ",,,", ", , ,", "B,20,10,3", ",,,")
+    assert list(tq.read_sizes(table)) == ["A", "B"]
+
+
+def test_sizes_are_in_the_first_sheet_and_a_message_says_so(tmp_path):
+    book = Workbook()
+    book.active.title = "Notes"
+    sheet = book.create_sheet("Sizes")
+    sheet.append(HEADER.split(","))
+    sheet.append(["A", 20, 10, 3])
+    book.save(tmp_path / "book.xlsx")
+    with pytest.raises(tq.InputError, match="sheet 'Notes', which is the first, holds no sizes"):
+        tq.read_sizes(tmp_path / "book.xlsx")
 
 
 def test_python_reads_each_file_with_its_sizes(laboratory):

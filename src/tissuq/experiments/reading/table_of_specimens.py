@@ -21,6 +21,9 @@ from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
 
 EXAMPLE_OF_SIZES = "specimen,length [mm],width [mm],thickness [mm]"
 """A first line of a table of sizes."""
+SEPARATORS = "\t;,"
+BETWEEN_CELLS = SEPARATORS + " "
+"""What a line without cells consists of."""
 
 
 def table_of_specimens(
@@ -42,15 +45,17 @@ def table_of_specimens(
         When there is no such table in the file.
     """
     workbook = file_format(path)
-    lines = next(iter(workbook.lines_by_sheet(os.fspath(path)).values()), []) if workbook else read_lines(path)
-    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
+    sheets = workbook.lines_by_sheet(os.fspath(path)) if workbook else {"": read_lines(path)}
+    sheet, lines = next(iter(sheets.items()), ("", []))
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip(BETWEEN_CELLS) and not is_comment(line)]
     if len(numbered) < 2:
+        place = f"{path}, sheet '{sheet}', which is the first," if len(sheets) > 1 else path
         raise InputError(
-            f"{path} holds no {what}. Write the names of the columns into the first line, such as '{example}', and a "
+            f"{place} holds no {what}. Write the names of the columns into the first line, such as '{example}', and a "
             "line for each specimen."
         )
     header = numbered[0][1]
-    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in "\t;," if mark in header), WHITESPACE)
+    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in SEPARATORS if mark in header), WHITESPACE)
     names = split(header, separator)
     rows = [line for _, line in numbered[1:]]
     table = Table(str(path), tuple(names), ("",) * len(names), separator, rows, [n for n, _ in numbered[1:]])
@@ -78,7 +83,8 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     Parameters
     ----------
     path : str or path
-        A text or a workbook. Its first line names the columns; the first column names the specimens, or their files.
+        A text, or a workbook with the table in its first sheet. Its first line names the columns; the first column
+        names the specimens, or their files.
         Columns of lengths, widths, thicknesses, diameters and areas have their units in the names, such as
         ``width [mm]``, or in a row beneath them; of numbered ones (``Thickness 1 (mm)``) it is the mean. Others are not
         looked at.
@@ -121,6 +127,11 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
             f"them as in '{EXAMPLE_OF_SIZES}'."
         )
     numbered_rows = list(enumerate(zip(labels, rows, strict=True)))[first:]
+    if unnamed := [row for row, (label, _) in numbered_rows if not label]:
+        raise InputError(
+            f"{table.place(0, unnamed[0])}: the row names no specimen. Write its name, in every row of its own; sizes "
+            "that were measured several times are columns such as 'width 1 [mm]'."
+        )
     return {label: _sizes_of_row(table, row, cells, of_sizes) for row, (label, cells) in numbered_rows}
 
 
