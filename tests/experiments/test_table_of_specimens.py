@@ -174,12 +174,15 @@ def test_a_folder_of_tests_has_the_sizes_of_its_specimen(laboratory, tmp_path):
     assert "modulus" in done_in(tmp_path, "population", tmp_path / "specimens", *options).out
 
 
-def test_a_file_that_takes_the_sizes_of_its_folder_says_so(laboratory, tmp_path):
+def test_a_file_that_may_have_the_sizes_of_its_folder_says_which_it_takes(laboratory, tmp_path):
     (tmp_path / "A").mkdir()
     (laboratory / "B.csv").rename(tmp_path / "A" / "B.csv")
     table = write(tmp_path / "sizes.csv", HEADER, "A,20,10,3")
     with pytest.warns(UserWarning, match="its sizes are taken from the row of its folder, 'A'"):
         done_in(tmp_path, "inspect", tmp_path / "A" / "B.csv", "--sizes", table)
+    write(table, HEADER, "A,20,10,3", "B,20,11,3")
+    with pytest.warns(UserWarning, match="another for its folder, 'A': its sizes are taken from its own"):
+        assert "11 mm as given" in done_in(tmp_path, "inspect", tmp_path / "A" / "B.csv", "--sizes", table).out
 
 
 def test_tests_in_the_folder_of_a_specimen_do_not_take_the_sizes_of_another_that_has_their_name(laboratory, tmp_path):

@@ -153,20 +153,27 @@ class TableOfSizes:
         """Return those of the specimen of a test, and in place of them what is given.
 
         It is the first that has one of some names; capitals and blanks are the same. Where none has, it is the one
-        whose name is that of the folder of the test, and a warning says so.
+        whose name is that of the folder of the test. A warning says so, and where these differ.
 
         Raises
         ------
         InputError
             When none of the rows is of it, or several are that differ in capitals and blanks alone.
         """
-        of_table = next((dimensions for name in names if (dimensions := self._row(name)) is not None), None)
-        if of_table is None and (of_table := self._row(folder)) is not None:
+        own = next((dimensions for name in names if (dimensions := self._row(name)) is not None), None)
+        of_folder = self._row(folder)
+        if of_folder is not None and of_folder != own:
+            rows = (
+                f"no row for {test}: its sizes are taken from the row of its folder, '{folder}'"
+                if own is None
+                else f"a row for {test} and another for its folder, '{folder}': its sizes are taken from its own"
+            )
             warn(
-                f"{self.file} has no row for {test}: its sizes are taken from the row of its folder, '{folder}'. If it "
-                "is of another specimen, name the file, or its specimen, in the first column.",
+                f"{self.file} has {rows}. If it is of another specimen, name the file, or its specimen, in the first "
+                "column.",
                 stacklevel=2,
             )
+        of_table = of_folder if own is None else own
         if of_table is None:
             raise InputError(
                 f"{self.file} has no row for {test}: its rows are of {', '.join(self.sizes)}. Name the file, or its "
