@@ -39,7 +39,7 @@ BASES = [
 
 @pytest.fixture
 def package(monkeypatch):
-    """Return a module of another package, whose classes are entry points of the group of their base class."""
+    """Return a module of another package, whose classes are entry points of their base class and go with the test."""
     module = ModuleType("another_package")
     monkeypatch.setitem(sys.modules, module.__name__, module)
 
@@ -53,7 +53,10 @@ def package(monkeypatch):
         return EntryPoints(points).select(**wanted)
 
     monkeypatch.setattr(registry, "entry_points", select)
-    return module
+    yield module
+    for kind in vars(module).values():
+        if isinstance(kind, type) and "name" in vars(kind):
+            del kind.name
 
 
 def test_every_base_class_has_a_group_of_its_own():
@@ -63,16 +66,17 @@ def test_every_base_class_has_a_group_of_its_own():
 
 
 def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(package):
-    module = {"__module__": package.__name__}
-    kinds = {
-        "offset": type("Offset", (Constant,), {"__module__": package.__name__}),
-        "loud": type("Loud", (tq.UnknownNoise,), {"__module__": package.__name__}),
-        "settling": type("Settling", (ZeroError,), {"__module__": package.__name__}),
-        "upright": type("Upright", (Uniaxial,), {"__module__": package.__name__}),
-        "box": type("Box", (tq.Uniform,), {"__module__": package.__name__}),
-        "pulled": type("Pulled", (ClampedBar,), {"__module__": package.__name__}),
-        "plain": type("Plain", (CardFormat,), {**module, "description": "", "cards": lambda *arguments: None}),
+    bases = {
+        "offset": Constant,
+        "loud": tq.UnknownNoise,
+        "settling": ZeroError,
+        "upright": Uniaxial,
+        "box": tq.Uniform,
+        "pulled": ClampedBar,
+        "plain": CardFormat,
     }
+    members = {"__module__": package.__name__, "description": "", "cards": lambda *arguments: None}
+    kinds = {name: type(name.title(), (base,), {**members, "name": name}) for name, base in bases.items()}
     vars(package).update(kinds)
     assert type(discrepancy_named("offset")) is kinds["offset"]
     assert type(noise_named("loud")) is kinds["loud"]
@@ -123,3 +127,9 @@ def test_an_unknown_name_is_still_refused_by_the_kind_that_was_meant(package):
         noise_named("unkown")
     with pytest.raises(tq.ModelError, match="there is no discrepancy named 'constnt'"):
         discrepancy_named("constnt")
+
+
+def test_a_class_under_the_name_of_another_is_refused_as_a_saved_run_would_name_that(package):
+    package.moved = type("Moved", (Constant,), {"__module__": package.__name__})
+    with pytest.raises(tq.ModelError, match=r"another_package:moved.*calls itself 'constant': give both one name"):
+        discrepancy_named("moved")

@@ -114,6 +114,8 @@ def load_plugins(group: str, accept: Callable[[Any, str], T], name: str | None =
             continue
         try:
             accepted.append(accept(loaded, point.value))
+            if (name_of_class := getattr(accepted[-1], "name", point.name)) != point.name:
+                raise ModelError(f"what it names calls itself '{name_of_class}': give both one name")
         except Exception as error:
             raise _unusable(point, error) from error
     return accepted

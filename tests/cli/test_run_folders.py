@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -263,3 +264,17 @@ def test_what_another_command_is_writing_is_left_alone(here):
         check_target(here / "out", "fit", force=True)
         assert folder.is_dir()
     assert (here / "out").is_dir()
+
+
+@pytest.mark.parametrize("arguments", [["Pr\udcfcfling.csv"], ["folder"]], ids=["argument", "in a folder"])
+def test_a_file_whose_name_is_not_in_utf_8_is_refused_in_words(specimen, here, arguments):
+    (here / "folder").mkdir()
+    for name in ("Pr\udcfcfling.csv", "folder/Pr\udcfcfling.csv"):
+        shutil.copy(specimen, here / name)
+    command = [sys.executable, "-m", "tissuq", "fit", *arguments, "--mode", "uniaxial", "--discrepancy", "none"]
+    done = subprocess.run(
+        [*command, "--no-figures"], cwd=here, capture_output=True, text=True, errors="replace", check=False
+    )
+    assert done.returncode == 2
+    assert re.search("a name is not in UTF-8: .*Pr.fling.csv", done.stderr)
+    assert "Traceback" not in done.stderr

@@ -91,6 +91,12 @@ def test_a_size_given_for_all_is_used_and_the_specimen_it_contradicts_is_named(l
     np.testing.assert_allclose(second.stress, 0.8 * STRESS, rtol=1e-6, atol=1e-9)
 
 
+def test_a_side_of_the_cross_section_that_the_file_contradicts_is_named_where_it_states_no_other(tmp_path):
+    path = written(tmp_path, f"# width: 8 mm\ndisplacement [mm],force [N]\n{rows(STRETCH - 1, STRESS, separator=',')}")
+    with pytest.warns(UserWarning, match=r"the width is 10 mm \(as given\), but the file says 8 mm \(in line 1\)"):
+        tq.read(path, length="1 mm", width="10 mm", thickness="0.1 mm")
+
+
 def test_a_long_table_of_sizes_above_the_measurements_is_no_test(tmp_path):
     widths = [5.0, 4.0, 3.0, 6.0, 7.0]
     head = "Size;Width [mm];Area [mm²];L0 [mm]\n"

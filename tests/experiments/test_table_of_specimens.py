@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import tomllib
 
 import numpy as np
 import pytest
+from openpyxl import Workbook
 
 import tissuq as tq
 from command_line import done_in, run_in
 from tissuq.experiments.reading.specimens_in_files import read_column
 from tissuq.experiments.reading.table_of_specimens import TableOfSizes
+from tissuq.studies.fit_settings import PopulationSettings
 from written_files import text_file
 
 SIZES = {"A": (20.0, 10.2, 3.1), "B": (21.5, 9.8, 2.9), "C": (19.2, 10.0, 3.3)}
@@ -81,6 +84,7 @@ def test_a_height_is_the_length_where_no_other_is_named(tmp_path):
     ("lines", "words"),
     [
         ([HEADER, "A,20,1o,3"], "line 2, column 'width [mm]': '1o' is no size"),
+        ([HEADER, "A,20,10 mm2,3"], "line 2, column 'width [mm]': '10 mm2' is no size"),
         ([HEADER, "A,20,-10,3"], "'-10' is no size"),
         (["specimen,length,width [mm]", "A,20,10"], "column 'length': '20' is no size with a unit"),
         (["specimen,area [mm2],width [mm],thickness [mm]", "A,40,10,3"], "cross-section is 40 mm2 and 30 mm2"),
@@ -88,12 +92,29 @@ def test_a_height_is_the_length_where_no_other_is_named(tmp_path):
         (["specimen,age", "A,40"], "'age' is known as a size"),
         ([HEADER, "A,20,10,3", "A.csv,20,10,3"], "specimen 'A' has several rows"),
         ([HEADER], "holds no sizes"),
+        ([HEADER, "A,20,10,3", ",20,10.4,3"], "line 3, column 'specimen': the row names no specimen"),
     ],
 )
 def test_what_is_no_table_of_sizes_is_refused(tmp_path, lines, words):
     with pytest.raises(tq.InputError) as refusal:
         tq.read_sizes(text_file(tmp_path / "sizes.csv", *lines))
     assert words in str(refusal.value)
+
+
+def test_rows_without_cells_stand_between_groups(tmp_path):
+    table = text_file(tmp_path / "sizes.csv", HEADER, "A,20,10,3", ",,,", ", , ,", "B,20,10,3", ",,,")
+    assert list(tq.read_sizes(table)) == ["A", "B"]
+
+
+def test_sizes_are_in_the_first_sheet_and_a_message_says_so(tmp_path):
+    book = Workbook()
+    book.active.title = "Notes"
+    sheet = book.create_sheet("Sizes")
+    sheet.append(HEADER.split(","))
+    sheet.append(["A", 20, 10, 3])
+    book.save(tmp_path / "book.xlsx")
+    with pytest.raises(tq.InputError, match="sheet 'Notes', which is the first, holds no sizes"):
+        tq.read_sizes(tmp_path / "book.xlsx")
 
 
 def test_python_reads_each_file_with_its_sizes(laboratory):
@@ -147,6 +168,36 @@ def test_a_folder_of_tests_has_the_sizes_of_its_specimen(laboratory, tmp_path):
             text_file(folder / f"test {number}.csv", "displacement [mm],force [N]", *rows)
     options = ["--sizes", laboratory / "sizes.csv", "--discrepancy", "none", "--no-figures", "--out", tmp_path / "run"]
     assert "modulus" in done_in(tmp_path, "population", tmp_path / "specimens", *options).out
+
+
+def test_a_file_that_may_have_the_sizes_of_its_folder_says_which_it_takes(laboratory, tmp_path):
+    (tmp_path / "A").mkdir()
+    (laboratory / "B.csv").rename(tmp_path / "A" / "B.csv")
+    table = text_file(tmp_path / "sizes.csv", HEADER, "A,20,10,3")
+    with pytest.warns(UserWarning, match="its sizes are taken from the row of its folder, 'A'"):
+        done_in(tmp_path, "inspect", tmp_path / "A" / "B.csv", "--sizes", table)
+    text_file(table, HEADER, "A,20,10,3", "B,20,11,3")
+    with pytest.warns(UserWarning, match="another for its folder, 'A': its sizes are taken from its own"):
+        assert "11 mm as given" in done_in(tmp_path, "inspect", tmp_path / "A" / "B.csv", "--sizes", table).out
+
+
+def test_tests_in_the_folder_of_a_specimen_do_not_take_the_sizes_of_another_that_has_their_name(laboratory, tmp_path):
+    for name in SIZES:
+        folder = tmp_path / "specimens" / name
+        folder.mkdir(parents=True)
+        for test in ("A", "B"):
+            shutil.copy(laboratory / f"{name}.csv", folder / f"{test}.csv")
+    settings = PopulationSettings(files=("specimens",), sizes=str(laboratory / "sizes.csv"), mode="uniaxial")
+    for name, readings in settings.readings(tmp_path).items():
+        for reading in readings:
+            check_stress(reading.experiment, name)
+
+
+def test_rows_that_differ_in_capitals_alone_are_not_taken_for_each_other(tmp_path):
+    sizes = TableOfSizes.read(text_file(tmp_path / "sizes.csv", HEADER, "S-1 left,20,10,3", "s_1_Left,20,11,3"))
+    assert sizes.dimensions(["s_1_Left"], "a test", None)["width"] == "11.0 mm"
+    with pytest.raises(tq.InputError, match="both may be 'S_1_LEFT'"):
+        sizes.dimensions(["S_1_LEFT"], "a test", None)
 
 
 @pytest.mark.parametrize("command", ["inspect", "fit", "population"])

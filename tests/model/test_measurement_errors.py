@@ -34,6 +34,22 @@ class Misshapen(MeasurementError):
         return np.ones(3)
 
 
+class Endless(MeasurementError):
+    """An error whose effect is no number."""
+
+    name = "endless"
+    description = "of no size"
+
+    def effect(self, points):
+        return np.nan * points.stress
+
+
+def test_an_effect_that_is_not_finite_is_refused():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
+    with pytest.raises(tq.ModelError, match="'endless' has an effect that is not a finite number"):
+        tq.fit(data, discrepancy="none", noise_sd=0.002, tolerances=Tolerances(endless=0.2))
+
+
 def test_an_effect_of_another_shape_is_refused():
     data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
     with pytest.raises(tq.ModelError, match=r"'misshapen' has an effect of shape \(3,\) on 15 stresses"):

@@ -94,3 +94,12 @@ def test_the_level_depends_on_neither_the_order_nor_the_unit_of_measurements():
 def test_measurements_at_one_stretch_have_one_level():
     data = tq.simulate("neo-hookean", {"C10": 0.5}, np.repeat(np.linspace(0.7, 1.5, 9), 3), 0.2, seed=3)
     assert np.ptp(stress_level(data).reshape(9, 3), axis=1).max() == 0
+
+
+@pytest.mark.parametrize("sd", [np.nan, np.inf, -1.0, np.ones(7)])
+def test_a_noise_whose_sizes_are_no_numbers_is_refused(sd):
+    name = property(lambda self: "wrong")  # that of an object is not kept
+    noise = type("Wrong", (tq.UnknownNoise,), {"sd": lambda self, values, level: sd, "name": name})()
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, np.linspace(1, 1.5, 16), noise_sd=0.01, seed=1)
+    with pytest.raises(tq.ModelError, match="noise 'wrong' cannot be used: sd "):
+        tq.fit(data, discrepancy="none", noise_sd=noise)

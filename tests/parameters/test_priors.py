@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from tissuq import Exponential, Flat, HalfCauchy, HalfNormal, InputError, LogNormal, LogUniform, Normal, Uniform
+from tissuq import (
+    Exponential,
+    Flat,
+    HalfCauchy,
+    HalfNormal,
+    InputError,
+    LogNormal,
+    LogUniform,
+    ModelError,
+    Normal,
+    Uniform,
+    fit,
+    simulate,
+)
 from tissuq.mechanics.stress import differentiator
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.registry import variants
@@ -108,3 +121,25 @@ def test_jax_sees_the_same_density(prior, law):
 def test_a_bad_prior_is_refused_in_words(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+@EVERY
+def test_no_prior_has_a_problem(prior, law):
+    assert not prior.problem
+
+
+@pytest.mark.parametrize(
+    "members",
+    [
+        {"log_density": lambda self, value: np.log(1.1) - value},
+        {"log_density": lambda self, value: np.nan * value},
+        {"quantile": lambda self, probability: -2 * np.log1p(-probability)},
+    ],
+    ids=["ten percent too much", "no number", "of another law"],
+)
+def test_a_density_that_is_not_that_of_the_quantiles_is_refused(members):
+    name = property(lambda self: "wrong")  # that of an object is not kept
+    prior = type("Wrong", (Exponential,), {**members, "name": name})(1.0)
+    data = simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.1}, np.linspace(1, 1.5, 16), noise_sd=0.01, seed=1)
+    with pytest.raises(ModelError, match=r"C10: the prior wrong.* cannot be used: its density is"):
+        fit(data, material="yeoh", discrepancy="none", noise_sd=0.01, priors={"C10": prior})

@@ -177,6 +177,27 @@ def test_a_law_of_ones_own_is_given_and_never_run(tmp_path):
     same(before.summary(), after.summary())
 
 
+def test_a_discrepancy_of_a_package_that_is_not_here_or_was_changed_is_named(tmp_path):
+    class Bump(tq.Discrepancy):
+        """A mean b (l - 1)^4; its name is not kept among those of classes."""
+
+        name = property(lambda self: "bump")
+        parameters = (tq.Parameter("b", "size of the bump"),)
+
+        def mean_basis(self, states):
+            return np.reshape(states.abscissa - 1, (-1, 1)) ** 4
+
+    class Moved(Bump):
+        def mean_basis(self, states):
+            return np.reshape(states.abscissa - 1, (-1, 1)) ** 5
+
+    tq.fit(measured(), discrepancy=Bump(), noise_sd=0.05).save(tmp_path / "p.nc")
+    with pytest.raises(tq.InputError, match=r"discrepancy 'bump' .* or of a package .* give it in Python as disc"):
+        tq.Posterior.load(tmp_path / "p.nc")
+    with pytest.raises(tq.InputError, match=r"other stresses than .* or else the discrepancy 'bump'"):
+        tq.Posterior.load(tmp_path / "p.nc", discrepancy=Moved())
+
+
 def test_a_law_that_was_changed_since_the_fit_is_refused(tmp_path):
     """Twice the stress with the same parameters: predictions were twice what was measured."""
 

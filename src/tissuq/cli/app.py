@@ -94,12 +94,21 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that shows no ± shows a ? instead
     try:
+        for argument in sys.argv[1:]:
+            argument.encode()  # a name that cannot be written into a run is refused before anything is computed
         app(prog_name="tissuq")
     except TissuqError as error:
         typer.echo(f"tissuq: {error}", err=True)
         sys.exit(2)
     except OSError as error:
         typer.echo(f"tissuq: {error}. Check the path, its permissions and the space on the disk.", err=True)
+        sys.exit(2)
+    except UnicodeEncodeError as error:
+        if error.reason != "surrogates not allowed":
+            raise
+        line = error.object[: error.start].rpartition("\n")[2] + error.object[error.start :].partition("\n")[0]
+        cure = "Rename the file or folder, or take a locale in UTF-8"
+        typer.echo(f"tissuq: a name is not in UTF-8: {line}. {cure}.", err=True)
         sys.exit(2)
     except SystemExit as end:
         if _nobody_reads(end):

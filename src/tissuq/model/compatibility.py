@@ -34,12 +34,15 @@ def check_parts(
     ------
     ModelError
         When the material does not deform as a mode says, it is no material by itself, discrepancy or noise have a
-        parameter of it, or discrepancy, noise and tolerances take up the same errors.
+        parameter of it, the noise has no sizes that are numbers, or discrepancy, noise and tolerances take up the same
+        errors.
     InputError
         When there is not one known noise for each test, or the noise needs one test, with repeats.
     """
     _check_modes(material, discrepancy, experiment)
     _check_parameters(material, discrepancy, noise)
+    if noise.problem:
+        raise ModelError(f"noise '{noise.name}' cannot be used: {noise.problem}.")
     _check_errors(discrepancy, noise, tolerances, experiment)
 
 

@@ -58,7 +58,21 @@ class Noise(ABC):
     @property
     def depends_on_level(self) -> bool:
         """Whether the standard deviation changes with the level of the stress."""
-        return bool(np.ptp(self.sd({p.symbol: 1.0 for p in self.parameters}, LEVELS_MPA)) > 0)
+        return bool(np.ptp(self._sd_at_ones()) > 0)
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with its standard deviations, in words; nothing where they are numbers, one for each level."""
+        sd = self._sd_at_ones()
+        if sd.shape not in ((), LEVELS_MPA.shape):
+            return f"sd has the shape {sd.shape} at {len(LEVELS_MPA)} stresses: it must be one number, or one for each"
+        return "" if np.all((sd >= 0) & np.isfinite(sd)) else f"sd is {sd} at parameters of one, not positive"
+
+    def __str__(self) -> str:
+        return self.name
+
+    def _sd_at_ones(self) -> FloatArray:
+        return np.asarray(self.sd({p.symbol: 1.0 for p in self.parameters}, LEVELS_MPA))
 
     def of_tests(self, experiment: Experiment) -> FloatArray:
         """Return the noise (tests,) of each of several tests as known or about, MPa; their ratios are taken as known.
@@ -131,9 +145,6 @@ class UnknownNoise(Noise):
 
     def sd(self, values: Mapping[str, Any], level: Any) -> Any:
         return values["noise_sd"]
-
-    def __str__(self) -> str:
-        return self.name
 
 
 class IndependentNoise(UnknownNoise):

@@ -371,7 +371,8 @@ class StatisticalModel(ErrorModel):
                     f"there is a prior for '{symbol}', but the parameters of this model are {', '.join(self.symbols)}."
                 )
         for parameter in self.parameters:
-            self._chosen_prior(parameter)
+            if (prior := self._chosen_prior(parameter)) and prior.problem:
+                raise ModelError(f"{parameter.symbol}: the prior {prior} cannot be used: {prior.problem}.")
 
     def _check_data(self) -> None:
         n, name = self.experiment.size, self.experiment.name
@@ -400,6 +401,8 @@ def _basis(material: Material, discrepancy: Discrepancy, states: States, bent: A
             f"discrepancy '{discrepancy.name}': mean_basis has the shape {of_discrepancy.shape}, not a column for each "
             f"of its linear parameters ({count})."
         )
+    if not np.isfinite(of_discrepancy).all():
+        raise ModelError(f"discrepancy '{discrepancy.name}': mean_basis is not finite everywhere.")
     shape = (*of_material.shape[:-1], of_discrepancy.shape[-1])
     return np.concatenate([of_material, np.broadcast_to(of_discrepancy, shape)], axis=-1)
 

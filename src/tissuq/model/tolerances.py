@@ -317,6 +317,8 @@ def _effect(error: MeasurementError, points: ErrorPoints) -> FloatArray:
             f"the error of a test '{error.name}' has an effect of shape {effect.shape} on {count} stresses: return a "
             "number for each of them."
         )
+    if not np.isfinite(effect).all():
+        raise ModelError(f"the error of a test '{error.name}' has an effect that is not a finite number.")
     return effect
 
 

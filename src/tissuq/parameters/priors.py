@@ -18,6 +18,11 @@ from tissuq.errors import InputError
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 from tissuq.registry import find
 
+SEEN_PROBABILITIES = np.array([0.25, 0.5, 0.75])
+STEP_OF_PROBABILITY = 1e-3
+SAME_DENSITY = 0.02
+"""Where a prior is looked at: at these quantiles its density is that of their differences, but for so much."""
+
 
 @dataclass(frozen=True)
 class Prior(ABC):
@@ -65,6 +70,21 @@ class Prior(ABC):
     @abstractmethod
     def quantile(self, probability: Any) -> Any:
         """Return the values below which the given probabilities lie."""
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with it, in words; nothing where its density is the derivative of its probability.
+
+        Examples
+        --------
+        >>> HalfCauchy(2.0).problem
+        ''
+        """
+        values = self.quantile(SEEN_PROBABILITIES + np.array([[-1], [0], [1]]) * STEP_OF_PROBABILITY)
+        ratios = np.exp(self.log_density(values[1])) * (values[2] - values[0]) / (2 * STEP_OF_PROBABILITY)
+        if np.allclose(ratios, 1.0, rtol=0.0, atol=SAME_DENSITY):
+            return ""
+        return f"its density is {ratios.round(2)} times that of its quantiles, not normalised or not of the same law"
 
     def within(self, support: tuple[float, float]) -> Self:
         """Return the prior for a parameter that can only take values in ``support``.
@@ -152,6 +172,7 @@ class Flat(Interval):
     high: float = inf
 
     name = "flat"
+    problem = ""
     _height = 0.0
 
     def within(self, support: tuple[float, float]) -> Self:

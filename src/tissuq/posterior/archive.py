@@ -155,8 +155,9 @@ def _check_unchanged(model: StatisticalModel, recorded: FloatArray | None) -> No
     if found.shape == recorded.shape and np.allclose(found, recorded, rtol=0, atol=SAME_LAW * size, equal_nan=True):
         return
     raise InputError(
-        f"the material '{model.material.name}' has other stresses than when this posterior was fitted, so that its "
-        "parameters would mean something else: take the law as it was then, or fit anew."
+        f"the material '{model.material.name}' has other stresses than when this posterior was fitted, or else the "
+        f"discrepancy '{model.discrepancy.name}' or the loading mode has, so that the parameters would mean something "
+        "else: take the law as it was then, or fit anew."
     )
 
 
@@ -201,9 +202,10 @@ def _named(kind: str, name: str, find: Callable[[str], T] | None, supplied: T | 
         with suppress(TissuqError):  # of the user's own, and not defined here
             registered = find(name)
     if registered is None and supplied is None:
+        of_file = " with --user-law law.py:Name, for a file is run only where you name it yourself, or"
         raise InputError(
-            f"the {kind} '{name}' of this posterior is your own, and its file is run only where you name it yourself: "
-            f"give it as {kind}= in Python, or with --user-law law.py:Name on the command line."
+            f"the {kind} '{name}' of this posterior is your own, or of a package that is not here or cannot be used: "
+            f"install that package, or give it{of_file if kind == 'material' else ''} in Python as {kind}=."
         )
     if supplied is not None and (supplied.name != name if registered is None else supplied != registered):
         raise InputError(f"this posterior is of the {kind} '{name}', not '{supplied.name}': leave it out, or fit anew.")

@@ -168,15 +168,16 @@ def reading_of(file: Path, files: Sequence[Path], reading: Mapping[str, Any]) ->
             del columns[role]
     others = {name: value for name, value in reading.items() if name != "sizes"}
     if sizes := reading.get("sizes"):
-        others["dimensions"] = sizes.dimensions(names_of(file), str(file), reading.get("dimensions"))
+        folder = Path(str(file)).resolve().parent.name
+        others["dimensions"] = sizes.dimensions(names_of(file), str(file), reading.get("dimensions"), folder)
     return {**others, "columns": columns or None}
 
 
 def names_of(file: Path) -> list[str]:
-    """Return how a table of specimens may call that of a file, or of the test FILE#NAME: as these, or as its folder."""
+    """Return how a table of specimens may call that of a file, or of the test FILE#NAME."""
     name, _, test = (str(file), "", "") if file.exists() else str(file).partition("#")
     path = Path(name)
-    return [name for name in (test, path.name, path.stem, path.resolve().parent.name) if name]
+    return [name for name in (test, path.name, path.stem) if name]
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

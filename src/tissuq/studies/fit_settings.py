@@ -316,7 +316,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
             for file in files:
                 of_file: ReadingOptions = {**options}
                 if sizes is not None:
-                    of_file["dimensions"] = sizes.dimensions([*names_of(file), name], str(file), self.dimensions)
+                    of_file["dimensions"] = sizes.dimensions([name, *names_of(file)], str(file), self.dimensions)
                 tests_of.setdefault(name, []).extend(
                     find_tests_in_file(file, is_one_of_several=len(files) > 1, **of_file)
                 )

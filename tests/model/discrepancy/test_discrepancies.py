@@ -139,6 +139,19 @@ class Bump(tq.Discrepancy):
         return (np.asarray(states.abscissa) - 1) ** 2
 
 
+class Lost(Bump):
+    """A bump whose basis is no number; its name is not kept."""
+
+    def mean_basis(self, states):
+        return np.full((len(states), 1), np.nan)
+
+
+def test_a_basis_that_is_not_finite_is_refused():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.01, seed=1)
+    with pytest.raises(tq.ModelError, match="'bump': mean_basis is not finite everywhere"):
+        tq.fit(data, discrepancy=Lost(), noise_sd=0.01)
+
+
 def test_a_basis_without_a_column_for_each_linear_parameter_is_refused():
     data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.01, seed=1)
     with pytest.raises(tq.ModelError, match=r"'bump': mean_basis has the shape \(16,\), not a column for"):

@@ -162,7 +162,7 @@ def _turned(dimensions: Dimensions) -> Dimensions:
 
 
 def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> Iterator[str]:
-    """Yield a sentence where the file states another length or cross-section than the user."""
+    """Yield a sentence where the file states another length, cross-section or side of it than the user."""
     pairs = []
     is_length = "length" in dimensions.set_by_user and not dimensions.sizes["length"].unit
     if is_length and "length" in stated:
@@ -170,6 +170,9 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
     is_set_by_user = any(dimensions.set_by_user & set(SECTIONS[form]) for form in sections_of(dimensions.sizes))
     if is_set_by_user and sections_of(stated):
         pairs.append(("cross-section", "mm2", dimensions.area, next(iter(sections_of(stated).values()))))
+    elif is_set_by_user:
+        sides = [name for name in stated if name in dimensions.set_by_user and name != "length"]
+        pairs += [(name, quantity_of(name).unit, dimensions.sizes[name], stated[name]) for name in sides]
     for what, unit, size, in_file in pairs:
         if not agree(size, in_file):
             yield (

@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from warnings import warn
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.dimensions import WAYS, Dimension, agree, quantity_of, sections_of
@@ -21,6 +22,9 @@ from tissuq.parameters.checks import checked_path
 
 EXAMPLE_OF_SIZES = "specimen,length [mm],width [mm],thickness [mm]"
 """A first line of a table of sizes."""
+SEPARATORS = "\t;,"
+BETWEEN_CELLS = SEPARATORS + " "
+"""What a line without cells consists of."""
 
 
 def table_of_specimens(
@@ -42,15 +46,17 @@ def table_of_specimens(
         When there is no such table in the file.
     """
     workbook = file_format(path)
-    lines = next(iter(workbook.lines_by_sheet(os.fspath(path)).values()), []) if workbook else read_lines(path)
-    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
+    sheets = workbook.lines_by_sheet(os.fspath(path)) if workbook else {"": read_lines(path)}
+    sheet, lines = next(iter(sheets.items()), ("", []))
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip(BETWEEN_CELLS) and not is_comment(line)]
     if len(numbered) < 2:
+        place = f"{path}, sheet '{sheet}', which is the first," if len(sheets) > 1 else path
         raise InputError(
-            f"{path} holds no {what}. Write the names of the columns into the first line, such as '{example}', and a "
+            f"{place} holds no {what}. Write the names of the columns into the first line, such as '{example}', and a "
             "line for each specimen."
         )
     header = numbered[0][1]
-    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in "\t;," if mark in header), WHITESPACE)
+    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in SEPARATORS if mark in header), WHITESPACE)
     names = split(header, separator)
     rows = [line for _, line in numbered[1:]]
     table = Table(str(path), tuple(names), ("",) * len(names), separator, rows, [n for n, _ in numbered[1:]])
@@ -78,7 +84,8 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     Parameters
     ----------
     path : str or path
-        A text or a workbook. Its first line names the columns; the first column names the specimens, or their files.
+        A text, or a workbook with the table in its first sheet. Its first line names the columns; the first column
+        names the specimens, or their files.
         Columns of lengths, widths, thicknesses, diameters and areas have their units in the names, such as
         ``width [mm]``, or in a row beneath them; of numbered ones (``Thickness 1 (mm)``) it is the mean. Others are not
         looked at.
@@ -122,6 +129,11 @@ def read_sizes(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
             f"them as in '{EXAMPLE_OF_SIZES}'."
         )
     numbered_rows = list(enumerate(zip(labels, rows, strict=True)))[first:]
+    if unnamed := [row for row, (label, _) in numbered_rows if not label]:
+        raise InputError(
+            f"{table.place(0, unnamed[0])}: the row names no specimen. Write its name, in every row of its own; sizes "
+            "that were measured several times are columns such as 'width 1 [mm]'."
+        )
     return {label: _sizes_of_row(table, row, cells, of_sizes) for row, (label, cells) in numbered_rows}
 
 
@@ -137,19 +149,33 @@ class TableOfSizes:
         """Return those in a file."""
         return cls(str(path), read_sizes(path))
 
-    def dimensions(self, names: Collection[str], test: str, given: Mapping[str, str] | None) -> Mapping[str, str]:
+    def dimensions(
+        self, names: Collection[str], test: str, given: Mapping[str, str] | None, folder: str = ""
+    ) -> Mapping[str, str]:
         """Return those of the specimen of a test, and in place of them what is given.
 
-        It is the first that has one of some names; capitals and blanks are the same.
+        It is the first that has one of some names; capitals and blanks are the same. Where none has, it is the one
+        whose name is that of the folder of the test. A warning says so, and where these differ.
 
         Raises
         ------
         InputError
-            When none of the rows is of it.
+            When none of the rows is of it, or several are that differ in capitals and blanks alone.
         """
-        by_name = {plain(name): dimensions for name, dimensions in self.sizes.items()}
-        found = (self.sizes.get(name, by_name.get(plain(name))) for name in names)
-        of_table = next((dimensions for dimensions in found if dimensions is not None), None)
+        own = next((dimensions for name in names if (dimensions := self._row(name)) is not None), None)
+        of_folder = self._row(folder)
+        if of_folder is not None and of_folder != own:
+            rows = (
+                f"no row for {test}: its sizes are taken from the row of its folder, '{folder}'"
+                if own is None
+                else f"a row for {test} and another for its folder, '{folder}': its sizes are taken from its own"
+            )
+            warn(
+                f"{self.file} has {rows}. If it is of another specimen, name the file, or its specimen, in the first "
+                "column.",
+                stacklevel=2,
+            )
+        of_table = of_folder if own is None else own
         if of_table is None:
             raise InputError(
                 f"{self.file} has no row for {test}: its rows are of {', '.join(self.sizes)}. Name the file, or its "
@@ -157,6 +183,16 @@ class TableOfSizes:
             )
         replaced = WAYS if given and WAYS & given.keys() else frozenset()
         return {**{name: size for name, size in of_table.items() if name not in replaced}, **(given or {})}
+
+    def _row(self, name: str) -> Mapping[str, str] | None:
+        """Return the sizes of the specimen of that name, or of the only one but for capitals and blanks; or None."""
+        alike = [name] if name in self.sizes else [label for label in self.sizes if plain(label) == plain(name)]
+        if len(alike) > 1:
+            raise InputError(
+                f"{self.file} has rows for {' and '.join(map(repr, alike))}, and both may be '{name}': name one of "
+                "them exactly so."
+            )
+        return self.sizes[alike[0]] if alike else None
 
 
 def _sizes_of_row(table: Table, row: int, cells: Sequence[str], headings: Mapping[int, Heading]) -> dict[str, str]:
@@ -167,7 +203,7 @@ def _sizes_of_row(table: Table, row: int, cells: Sequence[str], headings: Mappin
             continue
         quantity, measurement = numbered(named.quantity)
         of_cell = sizes_of_text(Heading(quantity, named.unit), cells[column], "", "", measurement)
-        if not of_cell:
+        if not any(size.is_of(name, is_cylinder=True) for size in of_cell for name in DIMENSION_NAMES):
             raise InputError(
                 f"{table.place(column, row)}: '{cells[column]}' is no size with a unit. Write a number above zero, and "
                 "the unit into the name of the column, such as 'width [mm]'."
