@@ -1,4 +1,4 @@
-"""Messages about tables in memory propose what a person in Python can type, and no options of the shell."""
+"""Messages of functions that read propose what a person in Python can type, and no options of the shell."""
 
 from __future__ import annotations
 
@@ -33,17 +33,27 @@ REFUSED = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("read", [tq.read, tq.inspect, tq.read_tests, tq.fit])
+@pytest.mark.parametrize("is_file", [True, False])
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_refusal_of_a_table_proposes_arguments(name):
+def test_a_refusal_proposes_arguments(name, is_file, read, tmp_path):
     table, options, proposed = REFUSED[name]
-    frame = pd.DataFrame(table)
+    data = pd.DataFrame(table)
+    if is_file:
+        data.to_csv(tmp_path / "data.csv", index=False)
+        data = tmp_path / "data.csv"
+    if name == "two tests" and read in (tq.read_tests, tq.fit):
+        return  # these read both
     with pytest.raises(tq.InputError) as refusal:
-        tq.read(frame, **options)
+        read(data, **options)
     assert proposed in str(refusal.value)
     assert "--" not in str(refusal.value)
-    if name == "columns without names":
-        with pytest.raises(tq.InputError, match='stress="NAME"'):
-            tq.fit(frame)
+
+
+def test_an_inspection_proposes_arguments(tmp_path):
+    pd.DataFrame({"stretch": STRETCH, "stress": STRESS}).to_csv(tmp_path / "data.csv", index=False)
+    assert 'stress_unit="kPa"' in str(tq.inspect(tmp_path / "data.csv"))
+    assert "--" not in str(tq.inspect(tmp_path / "data.csv"))
 
 
 @pytest.mark.parametrize("option", READING)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -16,7 +16,7 @@ from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.options import PythonOptions
-from tissuq.experiments.reading.python_form import refusals_worded_for, wording_for
+from tissuq.experiments.reading.python_form import in_python, refusals_in_python
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.vocabulary import ROLE_OF_AXIAL_STRETCH, SPREADS
 from tissuq.experiments.units import stress_unit
@@ -194,9 +194,9 @@ def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
     >>> print(inspection.steps[0])
     stretch = column 'stretch'
     """
-    with refusals_worded_for(path):
+    with refusals_in_python(path):
         reading = read_file(path, **options)
-        return Inspection(reading, wording_for(path, reading.experiment.stress_unit))
+        return Inspection(reading, partial(in_python, stress_unit=reading.experiment.stress_unit))
 
 
 def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:

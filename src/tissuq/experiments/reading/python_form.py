@@ -1,12 +1,11 @@
-"""Messages about tables in memory propose what a person types in Python: arguments, not options of the shell."""
+"""Messages of functions that read propose what a person types in Python: arguments, not options of the shell."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from json import dumps
 from typing import Any
 
@@ -101,19 +100,14 @@ def _argument(option: str, typed: str, stress_unit: str) -> tuple[str, bool]:
     return f"{name}={quoted if is_number else dumps(quoted, ensure_ascii=False)}{rest}", True
 
 
-def wording_for(data: Any, stress_unit: str = "MPa") -> Callable[[str], str]:
-    """Return how messages about measurements are worded: those about tables in memory propose arguments alone."""
-    return partial(in_python, stress_unit=stress_unit) if is_data_frame(data) else str
-
-
 def is_to_be_read(data: Any) -> bool:
     """Tell whether measurements are still to be read: a file, or a table."""
     return isinstance(data, str | os.PathLike) or is_data_frame(data)
 
 
 @contextmanager
-def refusals_worded_for(data: Any) -> Iterator[None]:
-    """Refuse what is neither file nor table, and word other refusals as all messages about these measurements."""
+def refusals_in_python(data: Any) -> Iterator[None]:
+    """Refuse what is neither file nor table, and word other refusals for Python."""
     if not is_to_be_read(data):
         raise InputError(
             f"a file ('test.csv') or a table (a DataFrame, a Dataset of xarray) is needed, not {data!r:.80}."
@@ -121,5 +115,5 @@ def refusals_worded_for(data: Any) -> Iterator[None]:
     try:
         yield
     except InputError as refusal:
-        refusal.args = (wording_for(data)(str(refusal)),)
+        refusal.args = (in_python(str(refusal)),)
         raise

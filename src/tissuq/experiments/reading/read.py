@@ -9,7 +9,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import read_file
 from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.reading.options import PythonOptions
-from tissuq.experiments.reading.python_form import refusals_worded_for
+from tissuq.experiments.reading.python_form import refusals_in_python
 from tissuq.result_warning import Severity
 
 
@@ -154,7 +154,7 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     >>> tq.read(frame, stress="P [kPa]").stress.tolist()
     [0.0, 0.0025, 0.0055]
     """
-    with refusals_worded_for(path):
+    with refusals_in_python(path):
         reading = read_file(path, **options)
     experiment = experiment_of(reading)
     for warning in experiment.curves[0].warnings:

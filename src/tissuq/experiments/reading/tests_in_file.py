@@ -23,7 +23,7 @@ from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.findings import experiment_of
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.python_form import is_to_be_read, refusals_worded_for
+from tissuq.experiments.reading.python_form import is_to_be_read, refusals_in_python
 from tissuq.experiments.reading.recognition import find_column
 from tissuq.experiments.reading.rows_of_tests import SeveralSpecimens, columns_only, only_rows, other_label, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
@@ -88,7 +88,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
 
 def _read(path: Any, options: PythonOptions, *, is_one_of_several: bool = False) -> list[Experiment]:
     """Return all tests in one file or table, and warn of what there is to know of them."""
-    with refusals_worded_for(path):
+    with refusals_in_python(path):
         plain = spelled_out(options)
         tests = find_tests_in_file(path, is_one_of_several=is_one_of_several, **plain)
     experiments = [experiment_of(test.reading) for test in tests]
