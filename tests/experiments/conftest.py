@@ -12,7 +12,7 @@ from tissuq.experiments.reading import inspection, read, tests_in_file
 
 @pytest.fixture(autouse=True)
 def as_on_the_shell(request, monkeypatch):
-    """Leave messages about files as the shell shows them; that Python has its own form is what other tests are about."""
+    """Leave messages about files as the shell shows them: another module tests how Python words them."""
     if request.module.__name__.endswith("test_python_form"):
         return
 
