@@ -475,6 +475,8 @@ def test_instability_is_mended_by_fibres_of_a_sheet_and_by_leaving_out_a_fall_of
     uses = [Use(purpose, Verdict.NO, "") for purpose in PURPOSES]
     unstable = ResultWarning("stable in only 20 % of the draws.", "unstable")
     assert next_step(solution, uses, {}, [unstable]) == STEPS[name]
+    never = {"uniaxial": SimpleNamespace(probability=0.2), "planar": SimpleNamespace(probability=0.0)}
+    assert next_step(solution, uses, never, [unstable]) == STEPS["law" if name == "stable" else name]
 
 
 @pytest.mark.parametrize(
