@@ -139,7 +139,7 @@ def next_step(
                 name = "peak"
             elif name == "stable" and not all(
                 of_mode.probability for of_mode in ranges.values()
-            ):  # none to restrict to
+            ):
                 name = "law"
             return _with_options(STEPS[name], warning, warnings)
     if not solution.is_of_data:
