@@ -137,9 +137,7 @@ def next_step(
                 name = "fibres"
             elif name == "stable" and falls(model.experiment):
                 name = "peak"
-            elif name == "stable" and not all(
-                of_mode.probability for of_mode in ranges.values()
-            ):
+            elif name == "stable" and not all(of_mode.probability for of_mode in ranges.values()):
                 name = "law"
             return _with_options(STEPS[name], warning, warnings)
     if not solution.is_of_data:
