@@ -37,6 +37,19 @@ def test_tests_are_ranked_for_every_target_with_the_data_again(posterior):
     assert "planar 1 to 1.2, 10 points" in set(single["candidate"])
 
 
+def test_standard_deviations_are_in_the_unit_of_the_measurements_or_another(posterior):
+    of_kpa = tq.fit(posterior.model.experiment.labelled(stress_unit="kPa"), discrepancy="none", noise_sd=NOISE)
+    test, names = "planar 1:1.2 10", ["sd_now", "sd_after"]
+    for fitted, options, unit, factor in (
+        (posterior, {}, "MPa", 1.0), (of_kpa, {}, "kPa", 1000.0), (of_kpa, {"unit": "Pa"}, "Pa", 1e6)
+    ):  # fmt: skip
+        table = fitted.design(test, "C10", **options)
+        assert set(table["unit"]) == {unit}
+        np.testing.assert_allclose(table[names], factor * posterior.design(test, "C10")[names], rtol=1e-9)
+    with pytest.raises(tq.InputError, match="banana"):
+        posterior.design(test, unit="banana")
+
+
 def test_what_is_as_good_as_the_best_is_marked():
     """By hand: of two standard errors of a difference, or less than 1 %, and never a repeat of the data."""
     rows = [("a", 0.300, 0.004, False), ("b", 0.295, 0.003, False), ("again", 0.294, 0.0, True),

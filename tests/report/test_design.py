@@ -39,7 +39,7 @@ def test_numbers_are_in_the_unit_of_the_data(study):
     rows = table.rows
     best = study.table[study.table["target"] == "modulus"].iloc[0]
     assert rows[0][0] == best["candidate"]
-    assert float(rows[0][1]) == pytest.approx(1000 * best["sd_after"], rel=0.005)
+    assert float(rows[0][1]) == pytest.approx(best["sd_after"], rel=0.005)
     assert rows[0][2].startswith(f"{100 * best['reduction']:.1f} %")
     assert table.title.endswith("kPa now")
     assert "kPa" not in design_table(study, second).title

@@ -11,6 +11,7 @@ import numpy as np
 
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, measured_states, stability
 from tissuq.errors import InputError, ModelError
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.solution import Solution
 from tissuq.next_test.candidates import Candidate, candidate_named, default_candidates
 from tissuq.next_test.next_test import NextTest, Specimen
@@ -42,6 +43,7 @@ def rank_tests(
     points: int | Sequence[int] = (),
     specimen: Specimen | None = None,
     seed: int = 0,
+    unit: str | None = None,
     step: Callable[[str], None] = lambda text: None,
 ) -> pd.DataFrame:
     """Return candidates for the next test, best first for each target.
@@ -60,6 +62,8 @@ def rank_tests(
         posterior's tolerances state, or by 18 %. The same, unless the data are of several specimens.
     seed : int
         Seed of the drawn outcomes.
+    unit : str, optional
+        Unit of stress, such as ``"MPa"``; that of the measurements unless given.
     step : callable
         Called with the name of each candidate before it is computed.
 
@@ -68,7 +72,7 @@ def rank_tests(
     pandas.DataFrame
         One row for each target and candidate.
 
-        - target, unit (MPa or nothing), candidate, mode, low, high (the range of stretches), points.
+        - target, unit (that of stress, or nothing), candidate, mode, low, high (the range of stretches), points.
         - sd_now, sd_after: standard deviation of the target now, and the root of the expected variance after the test.
         - reduction: 1 - sd_after / sd_now; error: its standard error by simulation, zero in closed form.
         - beyond: share of the measurements at which I1 or I2 is larger than in the data.
@@ -86,6 +90,7 @@ def rank_tests(
     import pandas as pd
 
     model = solution.model
+    shown_unit = stress_unit(unit or model.experiment.stress_unit)
     check_seed(seed)
     counts = one_or_several(points, Integral, RULES["points"])
     for count in counts:
@@ -107,7 +112,7 @@ def rank_tests(
     rows: list[dict[str, Any]] = []
     for candidate, share in zip(ranked, stable, strict=True):
         step(candidate.name)
-        rows += _rows(next_test, candidate, share, is_requested=candidate in requested)
+        rows += _rows(next_test, candidate, share, shown_unit, is_requested=candidate in requested)
     table = pd.DataFrame(rows)
     order = {target.name: position for position, target in enumerate(targets_asked)}
     keys = pd.DataFrame({"target": table["target"].map(order), "gain": -table["reduction"]})
@@ -128,7 +133,9 @@ def _with_ties(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_requested: bool) -> list[dict[str, Any]]:
+def _rows(
+    next_test: NextTest, candidate: Candidate, stable: float, unit: StressUnit, *, is_requested: bool
+) -> list[dict[str, Any]]:
     """Return the rows of a candidate, one a target; without numbers where the material cannot be stretched so."""
     try:
         expected, problem = next_test.expected(candidate), ""
@@ -144,16 +151,17 @@ def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_reques
     notes += [FEW_COMPONENTS] * (expected is not None and expected.is_rough) + [problem] * bool(problem)
     rows = []
     for column, target in enumerate(next_test.targets):
+        to_mpa = unit.to_mpa if target.unit else 1.0
         numbers = {
-            "sd_now": next_test.sd_now[column],
-            "sd_after": expected.sd_after[column] if expected else np.nan,
+            "sd_now": next_test.sd_now[column] / to_mpa,
+            "sd_after": expected.sd_after[column] / to_mpa if expected else np.nan,
             "reduction": expected.reduction[column] if expected else np.nan,
             "error": expected.error[column] if expected else np.nan,
         }
         rows.append(
             {
                 "target": target.name,
-                "unit": target.unit,
+                "unit": unit.name if target.unit else "",
                 "candidate": candidate.name,
                 "mode": candidate.mode.name,
                 "low": float(candidate.stretch.min()),

@@ -239,7 +239,7 @@ class Posterior(PosteriorPlots):
     ) -> pd.DataFrame:
         """Rank tests that could be made next by how much less uncertain they are expected to make a target.
 
-        The columns, and the ``options`` points, specimen and seed, are those of `tissuq.next_test.rank_tests`.
+        The columns, and the ``options`` points, specimen, seed and unit, are those of `tissuq.next_test.rank_tests`.
 
         Parameters
         ----------

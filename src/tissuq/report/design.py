@@ -58,8 +58,6 @@ NEXT = (
 OR_AGAIN, AS_MUCH = " (the same test again lowers it as much)", 0.01
 """What is said of a repeat of the data, and by how much of the sd now another test must be better."""
 BEYOND = UNSTABLE
-SDS = ("sd_now", "sd_after")
-"""Columns in the unit of a target."""
 
 
 def _next_step(study: DesignStudy, is_spoilt: bool) -> str:
@@ -201,9 +199,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings, run: Path) -> Resu
 
 def _rows_of(study: DesignStudy, target: Target) -> pd.DataFrame:
     """Return the rows of a target, standard deviations in the unit of the data, which stands among them."""
-    rows, has_unit = study.table[study.table["target"] == target.name], target.unit
-    to_mpa, name = (study.unit.to_mpa, study.unit.name) if has_unit else (1.0, "")
-    return rows.assign(unit=name, **{column: rows[column] / to_mpa for column in SDS})
+    return study.table[study.table["target"] == target.name]
 
 
 def _ranked(study: DesignStudy, target: Target) -> tuple[pd.DataFrame, pd.DataFrame]:

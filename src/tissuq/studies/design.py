@@ -11,7 +11,6 @@ import numpy as np
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import loading_mode
-from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Material
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.next_test import NextTest
@@ -57,11 +56,6 @@ class DesignStudy:
     table: pd.DataFrame
     specimen: str
     error: float
-
-    @property
-    def unit(self) -> StressUnit:
-        """The unit in which stresses are shown."""
-        return self.posterior.model.experiment.shown_unit
 
     @property
     def explanations(self) -> list[str]:
