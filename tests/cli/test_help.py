@@ -58,6 +58,7 @@ def test_every_command_has_help(cli, name):
 def test_the_former_name_of_structure_still_runs_it_and_is_not_listed(cli, done):
     said = done("simulate", "--help")
     assert "Usage: tissuq simulate" in said.out
+    assert "It is 'tissuq structure' now" in " ".join(said.out.split())
     assert "simulate" not in cli("--help").out
 
 

@@ -79,7 +79,9 @@ for heading, commands in COMMANDS.items():
     for name, function in commands.items():
         app.command(name, cls=Command, rich_help_panel=heading)(function)
 app.add_typer(study.study, rich_help_panel="How far to trust it")
-app.command("simulate", cls=Command, hidden=True, deprecated=True)(finite_elements.structure)
+app.command("simulate", cls=Command, hidden=True, deprecated="It is 'tissuq structure' now.")(  # type: ignore[arg-type]
+    finite_elements.structure
+)
 
 
 UNREAD = 141
