@@ -53,7 +53,7 @@ def _origin(kind: type) -> str:
 def find(base: type[T], kind: str, name: str, error: type[TissuqError], further_names: Iterable[str] = ()) -> type[T]:
     """Return the variant of that name, or raise ``error`` that lists the names there are, and further ones."""
     classes = variants(base)
-    if name in classes:
+    if isinstance(name, str) and name in classes:
         return classes[name]
     for plugin in plugins(base, str(name)):
         return plugin

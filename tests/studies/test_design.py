@@ -37,9 +37,9 @@ def test_a_run_is_taken_up_and_tests_of_any_stretches_are_ranked(run):
     own = study.table.set_index(["target", "candidate"])
     x = 2 * (np.linspace(0.8, 1.3, 12) - np.linspace(0.8, 1.3, 12) ** -2)
     z = 2 * (np.array([0.9, 0.8]) - np.array([0.9, 0.8]) ** -2)
-    assert own.loc[("C10", "two"), "sd_after"] == pytest.approx(0.02 / np.sqrt(x @ x + z @ z), rel=1e-8)
-    assert own.loc[("modulus", "two"), "sd_after"] == pytest.approx(0.04 / np.sqrt(x @ x + z @ z), rel=1e-8)
-    assert (study.unit.name, study.specimen) == ("kPa", "same")
+    assert own.loc[("C10", "two"), "sd_after"] == pytest.approx(20 / np.sqrt(x @ x + z @ z), rel=1e-8)
+    assert own.loc[("modulus", "two"), "sd_after"] == pytest.approx(40 / np.sqrt(x @ x + z @ z), rel=1e-8)
+    assert (set(study.table["unit"]), study.specimen) == ({"kPa"}, "same")
     assert not study.warnings
 
 

@@ -20,6 +20,7 @@ from tissuq.experiments.modes import LoadingMode, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
 from tissuq.experiments.units import StressUnit
 from tissuq.experiments.units import stress_unit as stress_unit_of
+from tissuq.parameters.checks import check_count
 from tissuq.result_warning import ResultWarning, merged
 
 
@@ -368,6 +369,7 @@ class Experiment:
         >>> data.averaged(2000), data.averaged(2000).rows_name
         (<Experiment 'experiment': uniaxial, 2000 measured stresses in MPa>, 'means of 45 measurements')
         """
+        check_count(size, "size must be a number of rows, one or more")
         if self.size <= size:
             return self
         return self._of_curves(curve.of_means(size // len(self.curves)) for curve in self.curves)

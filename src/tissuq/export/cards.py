@@ -97,7 +97,7 @@ class CardSettings:
         if self.order is not None and self.law is None:
             raise InputError("the order belongs to a law: give the law as well, such as polynomial or ogden.")
         check_count(self.number, "the number of a material in a model is 1 or more")
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", self.name):
+        if not isinstance(self.name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", self.name):
             raise InputError(
                 f"'{self.name}' cannot name a material: use up to 40 letters, digits, _ and -, a letter first."
             )

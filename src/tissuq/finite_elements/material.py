@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from tissuq.arrays import FloatArray
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.energy_derivatives import FibreEnergy, Fibres, gradient, gradient_and_hessian, is_arithmetic
-from tissuq.mechanics import FibreMaterial, Material
+from tissuq.mechanics import FibreMaterial, Material, material_named
 from tissuq.mechanics.draws import Continuation, PiecewiseEnergy, sum_of_energies
 from tissuq.mechanics.material import MaterialSum
 from tissuq.mechanics.stress import differentiator
@@ -81,7 +81,7 @@ class FElupeMaterial:
     ) -> None:
         if not 0 <= bulk_modulus < np.inf or not 0 < unit < np.inf:
             raise InputError(f"a bulk modulus is zero or a positive number of MPa, not {bulk_modulus!r}.")
-        self.energy, fibres = _matrix_and_fibres(material, values)
+        self.energy, fibres = _matrix_and_fibres(material_named(material), values)
         self.fibres = FibreEnergy(fibres, np.asarray(directions, dtype=np.float64)) if fibres else None
         self.bulk_modulus = float(bulk_modulus)
         self.unit = float(unit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
+from numbers import Integral
 from typing import Any, TypedDict, cast
 
 import numpy as np
@@ -99,6 +100,10 @@ class PythonOptions(ReadingOptions, total=False):
     unit: str | None
 
 
+BY_NAME = {"columns": "{'stress': 'P [kPa]'}", "dimensions": "{'width': '5 mm'}", "only": "{'specimen': 'A'}"}
+"""Options that are mappings, each with an example."""
+TEXTS = ("name", "sheet", *NAMES_OF_OPTIONS)
+"""Options that are texts, or numbers of sheets."""
 PARTS = {
     name: "dimensions" if name in DIMENSION_NAMES else "columns"
     for name in PythonOptions.__annotations__
@@ -140,6 +145,7 @@ def spelled_out(options: Mapping[str, Any], more_names: Collection[str] = ()) ->
             hint = f" Did you mean '{close[0]}'?" if close else f" There are: {', '.join(names)}."
             raise InputError(f"there is no option '{name}'.{hint}")
         if name in PARTS and value is not None:
+            _check_kinds(options)
             entries = dict(options.get(option) or {}) | dict(result.get(option) or {})
             if entries.get(name) is not None:
                 raise InputError(f"{name} is given by itself and in {option}: give it once.")
@@ -150,7 +156,18 @@ def spelled_out(options: Mapping[str, Any], more_names: Collection[str] = ()) ->
             result[option] = value
         elif name not in PARTS and name != "unit":
             result.setdefault(name, _as_texts(value))
+    _check_kinds(result)
     return cast(ReadingOptions, result)
+
+
+def _check_kinds(options: Mapping[str, Any]) -> None:
+    """Refuse options that are of another kind."""
+    for name, example in BY_NAME.items():
+        if not isinstance(options.get(name) or {}, Mapping):
+            raise InputError(f"{name} must be by name, such as {example}, not {options[name]!r:.80}.")
+    for name in TEXTS:
+        if not isinstance(options.get(name) or "", str | Integral if name == "sheet" else str):
+            raise InputError(f"{name} must be a text, not {options[name]!r:.80}.")
 
 
 def _plain(name: str, value: Any) -> str | int:
