@@ -134,6 +134,7 @@ def spelled_out(options: Mapping[str, Any], more_names: Collection[str] = ()) ->
     >>> spelled_out({"force": "Fz", "length": "20 mm", "unit": "kPa"})
     {'columns': {'force': 'Fz'}, 'dimensions': {'length': '20 mm'}, 'stress_unit': 'kPa'}
     """
+    _check_kinds(options)
     result: dict[str, Any] = {}
     for name, value in options.items():
         option = PARTS.get(name) or ("stress_unit" if name == "unit" else name)
@@ -145,7 +146,6 @@ def spelled_out(options: Mapping[str, Any], more_names: Collection[str] = ()) ->
             hint = f" Did you mean '{close[0]}'?" if close else f" There are: {', '.join(names)}."
             raise InputError(f"there is no option '{name}'.{hint}")
         if name in PARTS and value is not None:
-            _check_kinds(options)
             entries = dict(options.get(option) or {}) | dict(result.get(option) or {})
             if entries.get(name) is not None:
                 raise InputError(f"{name} is given by itself and in {option}: give it once.")
@@ -156,7 +156,6 @@ def spelled_out(options: Mapping[str, Any], more_names: Collection[str] = ()) ->
             result[option] = value
         elif name not in PARTS and name != "unit":
             result.setdefault(name, _as_texts(value))
-    _check_kinds(result)
     return cast(ReadingOptions, result)
 
 
